@@ -175,7 +175,8 @@ struct AddCommand {
 
   absl::Status CheckFiles() const;
   absl::Status Add(client::Client& client, client::CallOptions call) const;
-  // Adds the points in as many calls as it takes: those of each all or none. What was added is in `all`, on an error too.
+  // Adds the points in as many calls as it takes: those of each all or none. What was added is in `all`, on an error
+  // too.
   absl::Status AddInBatches(client::Client& client, const formats::PointCloud& cloud, const std::vector<uint32_t>& near,
                             client::CallOptions call, client::AddedVertices& all) const;
 };

@@ -426,7 +426,9 @@ SessionLife::Change SessionLife::SetSizesOf(int number, test::SplitMix64& random
   }
   v1::SetSizesRequest request = SizesRequestOf(session);
   // A client that makes the call again names the revision that was right the first time.
-  request.set_expected_revision(count == 0 ? 0 : session.revision);
+  if (count > 0) {
+    request.set_expected_revision(session.revision);
+  }
   ++session.revision;
   return {.step = Step::kSetSizes,
           .call =

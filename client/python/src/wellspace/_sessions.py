@@ -430,8 +430,9 @@ class Session:
     ) -> npt.NDArray[Any]:
         """Adds vertices at points, (k, d), of a session that was refined; returns their numbers, (k,).
 
-        All become vertices or, on an error, none; more than 4 MB of points take several calls. `near` has a vertex near each, from which the place is found in
-        O(1). The session is then to be refined again, which costs their surroundings.
+        All become vertices or, on an error, none; more than 4 MB of points take several calls. `near` has a vertex near
+        each, from which the place is found in O(1). The session is then to be refined again, which costs their
+        surroundings.
         """
         cloud = coordinates(points, "points", self.dimension)
         hints = indices([] if near is None else near, "near")
