@@ -23,8 +23,8 @@
 //   off   Geomview's in ascii: "OFF", the numbers of vertices, faces and edges, then a line for each vertex. What is
 //         before OFF announces numbers after the coordinates, which are skipped: ST texture, C colour, N normal. 4OFF
 //         has four coordinates, all taken as they are; nOFF says how many before the counts.
-// stl   In ascii, in any case, or binary: the corners of the triangles, each once; -0 is 0. A number of triangles of 0
-//         stands for all that follow.
+//   stl   In ascii, in any case, or binary: the corners of the triangles, each once; -0 is 0. A number of triangles of
+//         0 stands for all that follow.
 //   pcd   The Point Cloud Library's: fields x, y and, if it is there, z; data in ascii, binary or binary_compressed.
 //   las   1.0 to 1.4 of the ASPRS, point formats 0 to 10; points that are marked as withheld are left out. Compressed
 //         ones (laz) are refused: docs/adr/0034-laz-is-refused.md.
