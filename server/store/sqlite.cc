@@ -32,7 +32,7 @@ v1::ErrorReason ReasonOf(int code) {
 }
 
 // What has happened, and what is to be done about it, where SQLite's own words do not say it.
-std::string WordsOf(int code, int error, const char* words) {
+std::string ExplanationOf(int code, int error, const char* words) {
   if ((code & 0xff) == SQLITE_CANTOPEN && error == ENOENT) {
     return "the database is missing";
   }
@@ -84,7 +84,8 @@ SqliteDatabase::~SqliteDatabase() { sqlite3_close_v2(handle_); }
 absl::Status SqliteDatabase::ErrorOf(int code) const {
   const v1::ErrorReason reason = ReasonOf(code);
   const int error = sqlite3_system_errno(handle_);
-  std::string message = absl::StrCat(path_, ": ", WordsOf(code, error, sqlite3_errmsg(handle_)), " (SQLite ", code);
+  std::string message =
+      absl::StrCat(path_, ": ", ExplanationOf(code, error, sqlite3_errmsg(handle_)), " (SQLite ", code);
   absl::StrAppend(&message,
                   reason == v1::ERROR_REASON_STORE_FAILED && error != 0 ? absl::StrCat(": ", std::strerror(error)) : "",
                   ")");

@@ -24,7 +24,7 @@ HiddenFolders& Hidden() {
 // Whether the character may be of the name of a file that goes on.
 bool IsOfName(char c) { return absl::ascii_isalnum(c) || c == '_' || c == '-' || c == '.' || c == '/'; }
 
-std::string Without(const std::string& folder, std::string_view message) {
+std::string CutFolder(const std::string& folder, std::string_view message) {
   std::string text;
   for (size_t at = 0; at < message.size();) {
     const size_t found = message.find(folder, at);
@@ -69,7 +69,7 @@ std::string WithoutFolders(std::string_view message) {
   HiddenFolders& hidden = Hidden();
   const std::lock_guard lock(hidden.mutex);
   for (const std::string& folder : hidden.folders) {
-    text = Without(folder, text);
+    text = CutFolder(folder, text);
   }
   return text;
 }
