@@ -199,7 +199,7 @@ absl::StatusOr<bool> DataFolder::FindDatabase() {
   if (!may_be_new || log_size > 0) {
     const std::string there = names.empty()
                                   ? (log_size > 0 ? LogPathOf(paths_.database()) : MarkPathOf(paths_.database()))
-                                  : absl::StrCat(names.size(), " files of sessions in ", paths_.files());
+                                  : absl::StrCat("files of sessions in ", paths_.files(), " (", names.size(), ")");
     return MakeError(v1::ERROR_REASON_FILE_DAMAGED,
                      absl::StrCat(paths_.database(),
                                   ": the database is missing or empty, and there is what belongs to "
