@@ -74,6 +74,9 @@ HeldLock LockForBackUp(const std::function<HeldLock()>& take) {
 absl::Status CheckApart(const std::string& folder, const std::string& to) {
   std::error_code error;
   const std::filesystem::path outer = std::filesystem::canonical(folder, error);
+  if (error) {
+    return absl::OkStatus();  // it cannot be opened either, or is not of this machine
+  }
   const std::filesystem::path inner = std::filesystem::weakly_canonical(std::filesystem::absolute(to, error), error);
   const auto [end, ignored] = std::mismatch(outer.begin(), outer.end(), inner.begin(), inner.end());
   return error || end != outer.end()

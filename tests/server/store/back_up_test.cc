@@ -148,7 +148,7 @@ TEST_F(BackUpTest, AServerRemovesNothingMeanwhile) {
   const auto log = *DurableLog::Open({.folder = from_});
   std::shared_ptr<MeshSnapshot> mesh;
   ASSERT_TRUE(log->Commit({.session = SessionName(1), .state = MakeState(1)}).ok());
-  const auto points = log->OpenPoints(SessionName(1), 3, 0, {});
+  auto points = log->OpenPoints(SessionName(1), 3, 0, {});
   ASSERT_TRUE(Change(*log, 1, 1, *points, mesh).ok());
   for (const bool has_name : {true, false}) {
     // As a back-up holds them; the name of the one is gone in the second round.
@@ -165,6 +165,7 @@ TEST_F(BackUpTest, AServerRemovesNothingMeanwhile) {
       ASSERT_TRUE(Change(*log, 1, 2, *points, mesh).ok());
       ASSERT_TRUE(log->Commit({.session = SessionName(1), .is_deletion = true}).ok());
       mesh.reset();
+      points.reset();
     }
     const absl::StatusOr<Garbage> kept = log->RemoveGarbage();
     ASSERT_TRUE(kept.ok());

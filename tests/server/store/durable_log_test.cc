@@ -112,13 +112,15 @@ TEST_F(DurableLogTest, ManyCommitAtOnce) {
 TEST_F(DurableLogTest, ADeletionTakesTheFiles) {
   const auto log = Open();
   ASSERT_TRUE(log->Commit({.session = SessionName(1), .state = MakeState(1)}).ok());
-  const auto store = log->OpenPoints(SessionName(1), 3, 0, {});
+  auto store = log->OpenPoints(SessionName(1), 3, 0, {});
   ASSERT_TRUE(store->Append(std::vector<double>{1, 2, 3}).ok());
   auto mesh = *log->KeepMesh(SessionName(1), 1, MakeMesh({}), core::RunContext());
   store::v1::SessionRecord state = MakeState(1, 1);
   *state.mutable_mesh() = *mesh->record();
   ASSERT_TRUE(log->Commit({.session = SessionName(1), .state = state}).ok());
   ASSERT_TRUE(log->Commit({.session = SessionName(1), .is_deletion = true}).ok());
+  EXPECT_THAT(Files(), UnorderedElementsAre("00000001.mesh-1", "00000001.points")) << "an upload has them still";
+  store.reset();
   EXPECT_THAT(Files(), UnorderedElementsAre("00000001.mesh-1")) << "a download has it still";
   EXPECT_TRUE(DownloadOf(*mesh, true).ok());
   EXPECT_THAT(log->RemoveGarbage()->set_aside, IsEmpty());
