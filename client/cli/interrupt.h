@@ -20,6 +20,21 @@ class Interrupt {
   // kEnd: the first signal, whichever it is, ends the process: for work that does not look at a stop token.
   enum class First { kStop, kEnd };
 
+  // While it lives, the first signal ends the process: beside work that looks at the stop token, files are read, which
+  // does not.
+  class AtOnce {
+   public:
+    explicit AtOnce(const Interrupt& interrupt)
+        : interrupt_(interrupt), before_(interrupt.first_.exchange(First::kEnd)) {}
+    ~AtOnce() { interrupt_.first_ = before_; }
+    AtOnce(const AtOnce&) = delete;
+    AtOnce& operator=(const AtOnce&) = delete;
+
+   private:
+    const Interrupt& interrupt_;
+    const First before_;
+  };
+
   explicit Interrupt(First first = First::kStop);
   ~Interrupt();
   Interrupt(const Interrupt&) = delete;
@@ -34,7 +49,7 @@ class Interrupt {
   // Ends the process as `signal` does by default.
   [[noreturn]] static void End(int signal);
 
-  const First first_;
+  mutable std::atomic<First> first_;
   sigset_t previous_mask_;
   int signals_;  // signalfd
   int end_;      // eventfd

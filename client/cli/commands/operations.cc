@@ -66,8 +66,8 @@ struct OperationCommand {
   bool detach = false;
   std::optional<uint64_t> expected_revision;
 
-  absl::Status SetSizes(client::Client& client, client::CallOptions& call);
-  absl::StatusOr<client::Operation> Start(client::Client& client, client::CallOptions call);
+  absl::Status SetSizes(client::Client& client, client::CallOptions& call, const Interrupt& interrupt);
+  absl::StatusOr<client::Operation> Start(client::Client& client, client::CallOptions call, const Interrupt& interrupt);
   int Refine();
   int Watch() const;
   int Cancel() const;
@@ -75,10 +75,11 @@ struct OperationCommand {
 
 // Gives the session the sizes of the file, or takes those that it has. The revision that the refinement expects, if it
 // expects one, is then that after this.
-absl::Status OperationCommand::SetSizes(client::Client& client, client::CallOptions& call) {
+absl::Status OperationCommand::SetSizes(client::Client& client, client::CallOptions& call, const Interrupt& interrupt) {
   client::SizeSamples samples;
   if (sizes.IsGiven()) {
     WELLSPACE_ASSIGN_OR_RETURN(const client::Session session, client.GetSession(name, call));
+    const Interrupt::AtOnce reading(interrupt);
     WELLSPACE_ASSIGN_OR_RETURN(const auto read, sizes.Read(session.parameters.dimension));
     samples = *read;
   } else if (!no_sizes) {
@@ -94,14 +95,15 @@ absl::Status OperationCommand::SetSizes(client::Client& client, client::CallOpti
   return absl::OkStatus();
 }
 
-absl::StatusOr<client::Operation> OperationCommand::Start(client::Client& client, client::CallOptions call) {
+absl::StatusOr<client::Operation> OperationCommand::Start(client::Client& client, client::CallOptions call,
+                                                          const Interrupt& interrupt) {
   client::RefinementOptions refinement{.restart = restart};
   if (parameters.has_quality()) {
     WELLSPACE_ASSIGN_OR_RETURN(const client::Session session, client.GetSession(name, call));
     WELLSPACE_ASSIGN_OR_RETURN(refinement.parameters, parameters.Replace(session.parameters));
   }
   call.expected_revision = expected_revision;
-  WELLSPACE_RETURN_IF_ERROR(SetSizes(client, call));
+  WELLSPACE_RETURN_IF_ERROR(SetSizes(client, call, interrupt));
   // Not stopped by Ctrl-C: a user that does not learn that an operation was started cannot cancel it.
   call.stop = {};
   absl::StatusOr<client::Operation> started = client.StartRefinement(name, refinement, call);
@@ -127,7 +129,7 @@ int OperationCommand::Refine() {
   }
   return remote.Run([this](client::Client& client, const client::CallOptions& call,
                            const Interrupt& interrupt) -> absl::Status {
-    WELLSPACE_ASSIGN_OR_RETURN(const client::Operation started, Start(client, call));
+    WELLSPACE_ASSIGN_OR_RETURN(const client::Operation started, Start(client, call, interrupt));
     if (detach) {
       remote.json() ? PrintJson(OperationJson(started))
                     : static_cast<void>(std::cout << client::Printable(started.name) << "\n");

@@ -13,6 +13,7 @@
 #include "absl/strings/str_join.h"
 #include "client/cli/cloud_options.h"
 #include "client/cli/commands/commands.h"
+#include "client/cli/interrupt.h"
 #include "client/cli/meshing_options.h"
 #include "client/cli/options.h"
 #include "client/cli/remote_command.h"
@@ -174,7 +175,8 @@ struct AddCommand {
   std::optional<uint64_t> expected_revision;
 
   absl::Status CheckFiles() const;
-  absl::Status Add(client::Client& client, client::CallOptions call) const;
+  absl::StatusOr<formats::PointCloud> Read(const formats::CloudOptions& options, std::vector<uint32_t>* near) const;
+  absl::Status Add(client::Client& client, client::CallOptions call, const Interrupt& interrupt) const;
   // Adds the points in as many calls as it takes: those of each all or none. What was added is in `all`, on an error
   // too.
   absl::Status AddInBatches(client::Client& client, const formats::PointCloud& cloud, const std::vector<uint32_t>& near,
@@ -190,22 +192,30 @@ absl::Status AddCommand::CheckFiles() const {
   return files.Check();
 }
 
-absl::Status AddCommand::Add(client::Client& client, client::CallOptions call) const {
+// Reads the points, and a vertex near each if there is a file of them.
+absl::StatusOr<formats::PointCloud> AddCommand::Read(const formats::CloudOptions& options,
+                                                     std::vector<uint32_t>* near) const {
+  WELLSPACE_ASSIGN_OR_RETURN(formats::PointCloud cloud, formats::ReadCloud(input, options));
+  if (!near_path.empty()) {
+    WELLSPACE_ASSIGN_OR_RETURN(*near, ReadVertices(near_path));
+    if (near->size() != cloud.size()) {
+      return absl::InvalidArgumentError(absl::StrCat("--near ", near_path, ": expected a vertex for each of ",
+                                                     cloud.size(), " points, got ", near->size()));
+    }
+  }
+  return cloud;
+}
+
+absl::Status AddCommand::Add(client::Client& client, client::CallOptions call, const Interrupt& interrupt) const {
   WELLSPACE_ASSIGN_OR_RETURN(const client::Session found, client.GetSession(session, call));
   formats::CloudOptions options = cloud_options;
   options.dimension = found.parameters.dimension;
-  WELLSPACE_ASSIGN_OR_RETURN(const formats::PointCloud cloud, formats::ReadCloud(input, options));
+  std::vector<uint32_t> near;
+  std::optional<Interrupt::AtOnce> reading(interrupt);
+  WELLSPACE_ASSIGN_OR_RETURN(const formats::PointCloud cloud, Read(options, &near));
+  reading.reset();
   const CloudReport report = ReportOf(options, cloud.notes, cloud.skipped);
   PrintNotes(report, remote.format(), remote.quiet());
-  std::vector<uint32_t> near;
-  if (!near_path.empty()) {
-    WELLSPACE_ASSIGN_OR_RETURN(std::vector<uint32_t> read, ReadVertices(near_path));
-    if (read.size() != cloud.size()) {
-      return absl::InvalidArgumentError(absl::StrCat("--near ", near_path, ": expected a vertex for each of ",
-                                                     cloud.size(), " points, got ", read.size()));
-    }
-    near = std::move(read);
-  }
   call.expected_revision = expected_revision;
   client::AddedVertices all;
   const absl::Status status = AddInBatches(client, cloud, near, call, all);
@@ -302,9 +312,8 @@ void AddQueryCommands(CLI::App& app, int& exit_code) {
       exit_code = ReportError(status, add->remote.format());
       return;
     }
-    exit_code = add->remote.Run([&add](client::Client& client, const client::CallOptions& call, const Interrupt&) {
-      return add->Add(client, call);
-    });
+    exit_code = add->remote.Run([&add](client::Client& client, const client::CallOptions& call,
+                                       const Interrupt& interrupt) { return add->Add(client, call, interrupt); });
   });
 }
 

@@ -39,9 +39,11 @@ struct UploadCommand {
   std::optional<uint64_t> expected_revision;
 
   absl::Status CheckOptions() const;
-  absl::Status Upload(client::Client& client, client::CallOptions call);
-  absl::Status UploadCloud(client::Client& client, const client::Session& found, const client::CallOptions& call);
-  absl::Status UploadDomain(client::Client& client, const client::Session& found, const client::CallOptions& call);
+  absl::Status Upload(client::Client& client, client::CallOptions call, const Interrupt& interrupt);
+  absl::Status UploadCloud(client::Client& client, const client::Session& found, const client::CallOptions& call,
+                           const Interrupt& interrupt);
+  absl::Status UploadDomain(client::Client& client, const client::Session& found, const client::CallOptions& call,
+                            const Interrupt& interrupt);
   // Sends `total` points from number `first` of the session on, and shows how far that is.
   absl::StatusOr<client::Uploaded> Send(client::Client& client, client::PointSource& source, uint64_t first,
                                         uint64_t total, const client::CallOptions& call) const;
@@ -86,18 +88,20 @@ absl::StatusOr<client::Uploaded> UploadCommand::Send(client::Client& client, cli
       call);
 }
 
-absl::Status UploadCommand::Upload(client::Client& client, client::CallOptions call) {
+absl::Status UploadCommand::Upload(client::Client& client, client::CallOptions call, const Interrupt& interrupt) {
   WELLSPACE_ASSIGN_OR_RETURN(const client::Session found, client.GetSession(session, call));
   call.expected_revision = expected_revision;
-  return domain.IsDomain(input, cloud_options.format) ? UploadDomain(client, found, call)
-                                                      : UploadCloud(client, found, call);
+  return domain.IsDomain(input, cloud_options.format) ? UploadDomain(client, found, call, interrupt)
+                                                      : UploadCloud(client, found, call, interrupt);
 }
 
 absl::Status UploadCommand::UploadCloud(client::Client& client, const client::Session& found,
-                                        const client::CallOptions& call) {
+                                        const client::CallOptions& call, const Interrupt& interrupt) {
   formats::CloudOptions options = cloud_options;
   options.dimension = found.parameters.dimension;
+  std::optional<Interrupt::AtOnce> reading(interrupt);
   WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<client::CloudFile> opened, client::CloudFile::Open(input, options));
+  reading.reset();
   client::CloudFile& cloud = *opened;
   const CloudReport report = ReportOf(options, cloud.notes(), cloud.skipped());
   PrintNotes(report, remote.format(), remote.quiet());
@@ -120,8 +124,10 @@ absl::Status UploadCommand::UploadCloud(client::Client& client, const client::Se
 }
 
 absl::Status UploadCommand::UploadDomain(client::Client& client, const client::Session& found,
-                                         const client::CallOptions& call) {
+                                         const client::CallOptions& call, const Interrupt& interrupt) {
+  std::optional<Interrupt::AtOnce> reading(interrupt);
   const absl::StatusOr<formats::PointCloud> cloud = domain.Read(input, cloud_options);
+  reading.reset();
   if (!cloud.ok()) {
     return cloud.status();
   }
@@ -256,8 +262,10 @@ void AddUpload(CLI::App& app, int& exit_code) {
       exit_code = ReportError(status, command->remote.format());
       return;
     }
-    exit_code = command->remote.Run([&command](client::Client& client, const client::CallOptions& call,
-                                               const Interrupt&) { return command->Upload(client, call); });
+    exit_code = command->remote.Run(
+        [&command](client::Client& client, const client::CallOptions& call, const Interrupt& interrupt) {
+          return command->Upload(client, call, interrupt);
+        });
   });
 }
 

@@ -354,6 +354,31 @@ TEST(InterruptDeathTest, SecondSignalEndsTheProcess) {
       testing::ExitedWithCode(130), "");
 }
 
+// Readers of files look at no stop token: `upload` and `add` read while they have one.
+TEST(InterruptDeathTest, WhileAFileIsReadTheFirstSignalEndsTheProcess) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(
+      {
+        const Interrupt interrupt;
+        const Interrupt::AtOnce reading(interrupt);
+        kill(getpid(), SIGINT);
+        while (true) {
+          pause();
+        }
+      },
+      testing::KilledBySignal(SIGINT), "");
+}
+
+TEST(InterruptTest, AfterAFileWasReadTheFirstSignalRequestsAStop) {
+  Interrupt interrupt;
+  { const Interrupt::AtOnce reading(interrupt); }
+  std::promise<void> stopped;
+  const std::stop_callback callback(interrupt.token(), [&stopped] { stopped.set_value(); });
+  ASSERT_EQ(kill(getpid(), SIGINT), 0);
+  stopped.get_future().wait();
+  EXPECT_EQ(interrupt.signal(), SIGINT);
+}
+
 // `check` and `render` write pictures, and look at no stop token.
 TEST(InterruptDeathTest, SignalsThatEndTheProcessLeaveNoTemporaryFile) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
