@@ -49,14 +49,6 @@ bool IsSame(const core::FaceSeed& a, const core::FaceSeed& b) {
          a.first_segment == b.first_segment && a.segment_count == b.segment_count;
 }
 
-// Makes room for `count` in all, so that no Append copies much on average.
-template <typename T>
-void MakeRoom(std::vector<T>& values, size_t count) {
-  if (count > values.capacity()) {
-    values.reserve(std::max(count, 2 * values.capacity()));
-  }
-}
-
 absl::Status CheckSeed(const v1::FaceSeed& seed, uint64_t number) {
   if (!std::isfinite(seed.x()) || !std::isfinite(seed.y())) {
     return MakeError(
@@ -137,24 +129,24 @@ absl::Status CheckFaces(const v1::FaceOptions& options, uint64_t first) {
 void FeatureStore::Append(const v1::SegmentChunk& chunk, uint64_t known) {
   const auto skipped = static_cast<std::ptrdiff_t>(known);
   const size_t count = segment_count() + chunk.ends_size() / 2 - known;
-  MakeRoom(ends_, 2 * count);
-  MakeRoom(markers_, count);
-  MakeRoom(is_open_, count);
-  ends_.insert(ends_.end(), chunk.ends().begin() + 2 * skipped, chunk.ends().end());
+  ends_.MakeRoom(2 * count);
+  markers_.MakeRoom(count);
+  is_open_.MakeRoom(count);
+  ends_.Append(chunk.ends().begin() + 2 * skipped, chunk.ends().end());
   if (chunk.markers_size() != 0) {
-    markers_.insert(markers_.end(), chunk.markers().begin() + skipped, chunk.markers().end());
+    markers_.Append(chunk.markers().begin() + skipped, chunk.markers().end());
   }
-  markers_.resize(segment_count(), 0);
-  is_open_.resize(segment_count(), chunk.open() ? 1 : 0);
+  markers_.Resize(segment_count());
+  is_open_.Resize(segment_count(), chunk.open() ? 1 : 0);
 }
 
 void FeatureStore::Append(const v1::FaceOptions& options, uint64_t known) {
-  MakeRoom(seeds_, seed_count() + options.seeds_size() - known);
+  seeds_.MakeRoom(seed_count() + options.seeds_size() - known);
   has_rules_ = true;
   (void)RuleFromProto(options.faces(), &faces_);
   crossings_ = RuleFromProto(options.crossings());
   for (auto i = static_cast<int>(known); i < options.seeds_size(); ++i) {
-    seeds_.push_back(SeedFromProto(options.seeds(i)));
+    seeds_.Append(SeedFromProto(options.seeds(i)));
   }
 }
 
@@ -187,10 +179,10 @@ bool FeatureStore::HasOtherRules(const v1::FaceOptions& options) const {
 }
 
 void FeatureStore::TakeBack(const FeatureSummary& before) {
-  ends_.resize(2 * before.segments);
-  markers_.resize(before.segments);
-  is_open_.resize(before.segments);
-  seeds_.resize(before.seeds);
+  ends_.Resize(2 * before.segments);
+  markers_.Resize(before.segments);
+  is_open_.Resize(before.segments);
+  seeds_.Resize(before.seeds);
   has_rules_ = before.has_rules;
   (void)RuleFromProto(before.faces, &faces_);
   crossings_ = RuleFromProto(before.crossings);

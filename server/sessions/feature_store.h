@@ -3,10 +3,10 @@
 #define WELLSPACE_SERVER_SESSIONS_FEATURE_STORE_H_
 
 #include <cstdint>
-#include <vector>
 
 #include "absl/status/status.h"
 #include "core/features/features.h"
+#include "server/base/growing_array.h"
 #include "wellspace/store/v1/records.pb.h"
 #include "wellspace/v1/mesh.pb.h"
 
@@ -80,10 +80,10 @@ class FeatureStore {
   v1::CrossingRule crossing_rule() const;
 
   bool has_rules_ = false;  // some have come
-  std::vector<uint32_t> ends_;
-  std::vector<int32_t> markers_;
-  std::vector<uint8_t> is_open_;
-  std::vector<core::FaceSeed> seeds_;
+  GrowingArray<uint32_t> ends_;
+  GrowingArray<int32_t> markers_;
+  GrowingArray<uint8_t> is_open_;
+  GrowingArray<core::FaceSeed> seeds_;
   core::FaceRule faces_ = core::FaceRule::kBox;
   core::CrossingRule crossings_ = core::CrossingRule::kRefuse;
 };

@@ -64,14 +64,12 @@ absl::StatusOr<core::Mesh> MeshAgain(const Session& session, const core::MeshPar
                                      core::RunContext& context, SessionWork& work, bool* has_changed) {
   context.EnterPhase(core::Phase::kTree);
   WELLSPACE_RETURN_IF_ERROR(work.mesher->CheckFeasible(parameters));
-  {
-    WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> points,
-                               session.points().CopyFrom(work.meshed_points * parameters.dimension, context));
-    *has_changed = true;
-    if (const absl::Status added = work.mesher->AddPoints(points, context).status(); !added.ok()) {
-      *has_changed = false;  // it takes all or none
-      return added;
-    }
+  *has_changed = true;
+  const uint64_t count = session.points().coordinate_count() / parameters.dimension;
+  if (const absl::Status added = AddPointsTo(*work.mesher, session.points(), work.meshed_points, count, context);
+      !added.ok()) {
+    *has_changed = false;  // it takes all or none
+    return added;
   }
   WELLSPACE_RETURN_IF_ERROR(work.mesher->Refine(parameters, context));
   WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(work.mesher->memory_bytes() + work.mesh->loaded_bytes()));

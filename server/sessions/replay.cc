@@ -1,5 +1,6 @@
 #include "server/sessions/replay.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -8,6 +9,10 @@
 
 namespace wellspace::server {
 namespace {
+
+// A vertex that is added takes as much memory as this many of those that there are, at most in all but the most uneven
+// clouds.
+constexpr uint64_t kVerticesForOne = 2;
 
 // The structure as far as the steps have made it.
 class Structure {
@@ -36,7 +41,9 @@ class Structure {
   absl::Status Begin(const SessionStep& step, core::RunContext& context) {
     const core::MeshParameters& parameters = *step.refined_with;
     {
-      WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> points, Copy(parameters.dimension, step.end, context));
+      taken_ = step.end;
+      WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> points,
+                                 points_.Copy(0, step.end * parameters.dimension, context));
       WELLSPACE_ASSIGN_OR_RETURN(mesher_, BeginMesh(create_mesher_, parameters, points, features_, context));
     }
     WELLSPACE_RETURN_IF_ERROR(core::ReserveMemory(*mesher_, parameters, context));
@@ -46,12 +53,7 @@ class Structure {
   }
 
   absl::Status AddPointsUntil(uint64_t end, core::RunContext& context) {
-    WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> points, Copy(mesher_->dimension(), end, context));
-    return points.empty() ? absl::OkStatus() : mesher_->AddPoints(points, context).status();
-  }
-
-  absl::StatusOr<std::vector<double>> Copy(int dimension, uint64_t end, const core::RunContext& context) {
-    return points_.Copy(std::exchange(taken_, end) * dimension, end * dimension, context);
+    return AddPointsTo(*mesher_, points_, std::exchange(taken_, end), end, context);
   }
 
   const PointStore& points_;
@@ -70,6 +72,22 @@ absl::StatusOr<std::unique_ptr<core::Mesher>> BeginMesh(const MesherFactory& cre
                                                         core::RunContext& context) {
   const core::Features bounds = features.View();
   return create_mesher(parameters, points, features.IsEmpty() ? nullptr : &bounds, context);
+}
+
+uint64_t BytesWithVertices(const core::Mesher& mesher, uint64_t count) {
+  const uint64_t bytes = mesher.memory_bytes();
+  return bytes + kVerticesForOne * count * (bytes / std::max<uint64_t>(1, mesher.vertex_count()));
+}
+
+absl::Status AddPointsTo(core::Mesher& mesher, const PointStore& points, uint64_t first, uint64_t end,
+                         core::RunContext& context) {
+  if (first == end) {
+    return absl::OkStatus();
+  }
+  const uint64_t dimension = mesher.dimension();
+  WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(BytesWithVertices(mesher, end - first)));
+  WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> added, points.Copy(first * dimension, end * dimension, context));
+  return mesher.AddPoints(added, context).status();
 }
 
 absl::StatusOr<std::unique_ptr<core::Mesher>> Replay(const SessionSteps& steps, const PointStore& points,

@@ -2,9 +2,11 @@
 #ifndef WELLSPACE_SERVER_SESSIONS_REPLAY_H_
 #define WELLSPACE_SERVER_SESSIONS_REPLAY_H_
 
+#include <cstdint>
 #include <memory>
 #include <span>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "core/base/run_context.h"
 #include "core/mesh_parameters.h"
@@ -25,6 +27,17 @@ absl::StatusOr<std::unique_ptr<core::Mesher>> BeginMesh(const MesherFactory& cre
                                                         const core::MeshParameters& parameters,
                                                         std::span<const double> points, const FeatureStore& features,
                                                         core::RunContext& context);
+
+// What `mesher` takes with `count` more vertices, in all but the most uneven clouds.
+//
+// Complexity: O(1).
+uint64_t BytesWithVertices(const core::Mesher& mesher, uint64_t count);
+
+// Adds the points from number `first` up to `end` to `mesher`, for which the context is asked for memory first.
+//
+// Errors:     those of Mesher::AddPoints and PointStore::Copy; those of the context's lender, which change nothing.
+absl::Status AddPointsTo(core::Mesher& mesher, const PointStore& points, uint64_t first, uint64_t end,
+                         core::RunContext& context);
 
 // Takes `steps` again, from the first on, in the work of `job` but apart from its context. `last_mesh` is the mesh of
 // the last refinement among them.

@@ -199,13 +199,15 @@ class Session {
   // ---- Sizes at points: session_sizes.cc ----
 
   // Replaces the sizes at points that the next refinements keep to; null for none. `expected_revision` 0: any.
+  // `received`, if not null, is what was reserved for them so far: it is given back as far as the session reserves it.
   //
   // REQUIRES:   `samples` has passed CheckSizes.
   // Complexity: O(samples).
   // Errors:     INVALID_SIZES (outside the domain), SESSION_BUSY, QUOTA_EXCEEDED, MEMORY_LIMIT, REVISION_MISMATCH,
   //             SESSION_NOT_FOUND. Nothing has changed.
   // Where memory is short, idle sessions give some up first.
-  absl::Status SetSizes(const std::shared_ptr<const core::SizeSamples>& samples, uint64_t expected_revision);
+  absl::Status SetSizes(const std::shared_ptr<const core::SizeSamples>& samples, uint64_t expected_revision,
+                        MemoryReservation* received = nullptr);
   // The number of sizes, and the revision, as one.
   v1::SetSizesResponse CommittedSizes() const;
 
@@ -402,7 +404,8 @@ class Session {
   // What Restore sets besides steps and operations, before others know the session.
   void SetState(const StoredSession& stored);
   // What SetSizes and AddSegments do, but for RetryWithRoom.
-  absl::Status TryToSetSizes(const std::shared_ptr<const core::SizeSamples>& samples, uint64_t expected_revision);
+  absl::Status TryToSetSizes(const std::shared_ptr<const core::SizeSamples>& samples, uint64_t expected_revision,
+                             MemoryReservation* received);
   absl::Status TryToAddSegments(const v1::AddSegmentsRequest& request, uint64_t expected_revision);
   // Returns `change()`. Where memory has no room for it, it is called once more after idle sessions gave up `bytes`.
   absl::Status RetryWithRoom(uint64_t bytes, const std::function<absl::Status()>& change);

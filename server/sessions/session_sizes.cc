@@ -31,13 +31,14 @@ std::vector<SizesInUse> Session::UnusedSizesLocked(const SessionSteps& steps, ui
   return had;
 }
 
-absl::Status Session::SetSizes(const std::shared_ptr<const core::SizeSamples>& samples, uint64_t expected_revision) {
+absl::Status Session::SetSizes(const std::shared_ptr<const core::SizeSamples>& samples, uint64_t expected_revision,
+                               MemoryReservation* received) {
   return RetryWithRoom(samples == nullptr ? 0 : samples->bytes(),
-                       [&] { return TryToSetSizes(samples, expected_revision); });
+                       [&] { return TryToSetSizes(samples, expected_revision, received); });
 }
 
-absl::Status Session::TryToSetSizes(const std::shared_ptr<const core::SizeSamples>& samples,
-                                    uint64_t expected_revision) {
+absl::Status Session::TryToSetSizes(const std::shared_ptr<const core::SizeSamples>& samples, uint64_t expected_revision,
+                                    MemoryReservation* received) {
   std::lock_guard change_lock(change_mutex_);
   WELLSPACE_RETURN_IF_ERROR(LoadInputs());
   const uint64_t count = samples == nullptr ? 0 : samples->sizes.size();
@@ -64,6 +65,12 @@ absl::Status Session::TryToSetSizes(const std::shared_ptr<const core::SizeSample
     for (const SizesInUse& set : unused) {
       dropped += set.count;
     }
+    // The sets that are dropped are there until the end, beside the new one: what is reserved for it is handed over
+    // only as far as the account grows.
+    if (received != nullptr && samples != nullptr) {
+      const uint64_t beside = samples->bytes() / count * std::min(count, dropped);
+      (void)received->Split(received->bytes() - std::min(received->bytes(), beside));
+    }
     WELLSPACE_RETURN_IF_ERROR(point_account_.TakeSizes(count > dropped ? count - dropped : 0));
   }
   const absl::Status status = RunGuarded([&] {
@@ -72,7 +79,7 @@ absl::Status Session::TryToSetSizes(const std::shared_ptr<const core::SizeSample
       change.state->set_sizes(in_use.number);
       change.state->set_size_count(in_use.count);
       if (samples != nullptr) {
-        change.sizes = StoredSizes{.number = in_use.number, .parts = RecordsOf(*samples, dimension_)};
+        change.sizes = RecordsOf(in_use.number, samples, dimension_);
       }
       for (const SizesInUse& set : unused) {
         change.dropped_sizes.push_back(set.number);
@@ -100,10 +107,10 @@ v1::SetSizesResponse Session::CommittedSizes() const {
 }
 
 absl::Status Session::LoadSizes() {
-  WELLSPACE_ASSIGN_OR_RETURN(const std::vector<StoredSizes> sets, log_.ReadSizes(name_));
+  WELLSPACE_ASSIGN_OR_RETURN(std::vector<StoredSizes> sets, log_.ReadSizes(name_));
   std::map<uint64_t, std::shared_ptr<const core::SizeSamples>> samples;
-  for (const StoredSizes& set : sets) {
-    samples[set.number] = SamplesOf(set.parts);
+  for (StoredSizes& set : sets) {
+    samples[set.number] = SamplesOf(std::move(set.parts));
   }
   std::lock_guard lock(mutex_);
   std::vector<SizesInUse> wanted = steps_.sizes();

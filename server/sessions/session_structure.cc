@@ -13,18 +13,12 @@
 namespace wellspace::server {
 namespace {
 
-// A vertex that is added takes as much memory as this many of those that there are, at most in all but the most uneven
-// clouds.
-constexpr uint64_t kReservedVertices = 2;
-
 // Reserves memory for `count` more vertices in the mesher of `work`.
 absl::Status ReserveForVertices(uint64_t count, MemoryBudget& memory, SessionWork& work) {
   if (!memory.is_limited()) {
     return absl::OkStatus();
   }
-  const uint64_t bytes = work.mesher->memory_bytes();
-  const uint64_t wanted =
-      bytes + kReservedVertices * count * (bytes / std::max<uint64_t>(1, work.mesher->vertex_count()));
+  const uint64_t wanted = BytesWithVertices(*work.mesher, count);
   if (work.memory.Resize(wanted) ||
       (memory.MakeRoom(wanted - std::min(wanted, work.memory.bytes()), MemoryBudget::Want::kAllOrNothing) &&
        work.memory.Resize(wanted))) {

@@ -66,43 +66,56 @@ absl::Status CheckSizes(const v1::VertexSizes& chunk, uint64_t first, std::strin
   return CheckValues(chunk, first, std::string(field));
 }
 
-std::vector<store::v1::SizesRecord> RecordsOf(const core::SizeSamples& samples, int dimension) {
-  std::vector<store::v1::SizesRecord> records;
-  const size_t count = samples.sizes.size();
-  for (size_t begin = 0; begin < count; begin += kSamplesOfRecord) {
-    const size_t end = std::min(count, begin + kSamplesOfRecord);
-    v1::SizeSamples& part = *records.emplace_back().mutable_samples();
-    const double* points = samples.points.data();
+StoredSizes RecordsOf(uint64_t number, std::shared_ptr<const core::SizeSamples> samples, int dimension) {
+  StoredSizes stored{.number = number, .parts = {}};
+  stored.in_turn.count = (samples->sizes.size() + kSamplesOfRecord - 1) / kSamplesOfRecord;
+  stored.in_turn.bytes = samples->bytes();
+  stored.in_turn.make = [samples = std::move(samples), dimension](size_t record) {
+    const size_t begin = record * kSamplesOfRecord;
+    const size_t end = std::min(samples->sizes.size(), begin + kSamplesOfRecord);
+    store::v1::SizesRecord made;
+    v1::SizeSamples& part = *made.mutable_samples();
+    const double* points = samples->points.data();
     part.mutable_points()->Assign(points + begin * dimension, points + end * dimension);
-    part.mutable_sizes()->Assign(samples.sizes.data() + begin, samples.sizes.data() + end);
-    part.set_measure(samples.measure == core::SizeMeasure::kEdgeLength ? v1::SIZE_MEASURE_EDGE_LENGTH
-                                                                       : v1::SIZE_MEASURE_CIRCUMRADIUS);
-  }
-  return records;
+    part.mutable_sizes()->Assign(samples->sizes.data() + begin, samples->sizes.data() + end);
+    part.set_measure(samples->measure == core::SizeMeasure::kEdgeLength ? v1::SIZE_MEASURE_EDGE_LENGTH
+                                                                        : v1::SIZE_MEASURE_CIRCUMRADIUS);
+    return made;
+  };
+  return stored;
 }
 
-std::shared_ptr<const core::SizeSamples> SamplesOf(const std::vector<store::v1::SizesRecord>& records) {
+std::shared_ptr<const core::SizeSamples> SamplesOf(std::vector<store::v1::SizesRecord> records) {
   SizeStore store;
-  for (const store::v1::SizesRecord& record : records) {
-    store.Append(record.samples());
+  for (store::v1::SizesRecord& record : records) {
+    store.Append(record.mutable_samples());
   }
-  return store.Take();
+  return store.Take(core::RunContext());
 }
 
-void SizeStore::Append(const v1::SizeSamples& chunk) {
-  samples_.points.insert(samples_.points.end(), chunk.points().begin(), chunk.points().end());
-  samples_.sizes.insert(samples_.sizes.end(), chunk.sizes().begin(), chunk.sizes().end());
-  samples_.measure = MeasureOf(chunk.measure());
+void SizeStore::Append(v1::SizeSamples* chunk) {
+  measure_ = MeasureOf(chunk->measure());
+  points_.Append(chunk->mutable_points());
+  sizes_.Append(chunk->mutable_sizes());
 }
 
-void SizeStore::Append(const v1::VertexSizes& chunk) {
-  samples_.sizes.insert(samples_.sizes.end(), chunk.sizes().begin(), chunk.sizes().end());
-  samples_.measure = MeasureOf(chunk.measure());
+void SizeStore::Append(v1::VertexSizes* chunk) {
+  measure_ = MeasureOf(chunk->measure());
+  sizes_.Append(chunk->mutable_sizes());
 }
 
-std::shared_ptr<const core::SizeSamples> SizeStore::Take() {
-  core::SizeSamples samples = std::exchange(samples_, {});
-  return samples.sizes.empty() ? nullptr : std::make_shared<const core::SizeSamples>(std::move(samples));
+std::shared_ptr<const core::SizeSamples> SizeStore::Take(const core::RunContext& context) {
+  if (sizes_.count() == 0) {
+    return nullptr;
+  }
+  core::SizeSamples samples;
+  samples.points = vertices_.empty() ? points_.Flatten(context) : std::exchange(vertices_, {});
+  samples.sizes = sizes_.Flatten(context);
+  samples.measure = measure_;
+  if (context.IsCancelled()) {
+    return nullptr;
+  }
+  return std::make_shared<const core::SizeSamples>(std::move(samples));
 }
 
 }  // namespace wellspace::server

@@ -8,7 +8,10 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "core/base/run_context.h"
 #include "core/geometry/criterion.h"
+#include "server/sessions/number_chunks.h"
+#include "server/store/session_log.h"
 #include "wellspace/store/v1/records.pb.h"
 #include "wellspace/v1/mesh.pb.h"
 #include "wellspace/v1/sessions.pb.h"
@@ -24,10 +27,10 @@ absl::Status CheckSizes(const v1::SizeSamples& chunk, uint64_t first, int dimens
 // The same of sizes of vertices, without points.
 absl::Status CheckSizes(const v1::VertexSizes& chunk, uint64_t first, std::string_view field);
 
-// What is written down of `samples`: several records, if they are many.
-std::vector<store::v1::SizesRecord> RecordsOf(const core::SizeSamples& samples, int dimension);
-// What was written down.
-std::shared_ptr<const core::SizeSamples> SamplesOf(const std::vector<store::v1::SizesRecord>& records);
+// What is written down of `samples`, which are some: several records, if they are many, each made when it is asked for.
+StoredSizes RecordsOf(uint64_t number, std::shared_ptr<const core::SizeSamples> samples, int dimension);
+// What was written down. The records are freed as they are read.
+std::shared_ptr<const core::SizeSamples> SamplesOf(std::vector<store::v1::SizesRecord> records);
 
 // Samples that grow at the end.
 //
@@ -35,25 +38,31 @@ std::shared_ptr<const core::SizeSamples> SamplesOf(const std::vector<store::v1::
 // Invariants: what is appended has passed CheckSizes.
 class SizeStore {
  public:
-  // The measure is from now on that of `chunk`.
-  void Append(const v1::SizeSamples& chunk);
+  // Takes over the samples of `chunk`. The measure is from now on its.
+  void Append(v1::SizeSamples* chunk);
 
   // Sizes alone, whose points come later, by SetPoints.
-  void Append(const v1::VertexSizes& chunk);
-  // Takes the points of the samples: count() x dimension, row-major.
+  void Append(v1::VertexSizes* chunk);
+  // Sets the points of the samples: count() x dimension, row-major.
   template <typename Coordinates>
   void SetPoints(const Coordinates& points) {
-    samples_.points.assign(points.begin(), points.end());
+    vertices_.assign(points.begin(), points.end());
   }
 
-  uint64_t count() const { return samples_.sizes.size(); }
-  uint64_t bytes() const { return samples_.bytes(); }
+  uint64_t count() const { return sizes_.count(); }
+  // Of what it holds.
+  uint64_t bytes() const { return points_.bytes() + sizes_.bytes() + vertices_.size() * sizeof(double); }
 
-  // Hands over the samples; null if there are none. Leaves this empty.
-  std::shared_ptr<const core::SizeSamples> Take();
+  // Hands over the samples; null if there are none, or the run is cancelled. Leaves this empty.
+  //
+  // Complexity: O(samples): they are copied, and freed as they are.
+  std::shared_ptr<const core::SizeSamples> Take(const core::RunContext& context);
 
  private:
-  core::SizeSamples samples_;
+  NumberChunks points_;
+  NumberChunks sizes_;
+  std::vector<double> vertices_;  // of SetPoints
+  core::SizeMeasure measure_ = core::SizeMeasure::kCircumradius;
 };
 
 }  // namespace wellspace::server

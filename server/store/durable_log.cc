@@ -30,6 +30,7 @@ uint64_t BytesOf(const SessionChange& change) {
     bytes += step.ByteSizeLong();
   }
   if (change.sizes.has_value()) {
+    bytes += change.sizes->in_turn.bytes;
     for (const store::v1::SizesRecord& part : change.sizes->parts) {
       bytes += part.ByteSizeLong();
     }

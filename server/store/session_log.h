@@ -2,7 +2,9 @@
 #ifndef WELLSPACE_SERVER_STORE_SESSION_LOG_H_
 #define WELLSPACE_SERVER_STORE_SESSION_LOG_H_
 
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -21,8 +23,16 @@ namespace wellspace::server {
 
 // A set of sizes at points, which a session has, or has had for a step that is taken again by Replay.
 struct StoredSizes {
+  // Parts that are made when they are written down, one after the other, so that they are never held together.
+  struct InTurn {
+    size_t count = 0;
+    uint64_t bytes = 0;  // of all, about
+    std::function<store::v1::SizesRecord(size_t)> make{};
+  };
+
   uint64_t number = 0;  // of those of its session; above 0
   std::vector<store::v1::SizesRecord> parts;
+  InTurn in_turn{};  // come behind `parts`; none of a set that was read
 };
 
 // What changes with one change of a session: all of it, or nothing.

@@ -338,12 +338,19 @@ absl::Status SessionTables::WriteSizes(int64_t session, const SessionChange& cha
   }
   const auto number = static_cast<int64_t>(change.sizes->number);
   int64_t part = 0;
-  for (const store::v1::SizesRecord& sizes : change.sizes->parts) {
+  const auto write = [&](const store::v1::SizesRecord& sizes) {
     const std::string record = sizes.SerializeAsString();
     statements_->insert_sizes.Bind(session, number, part, SqliteStatement::Blob{record},
                                    ChecksumOf(KeyOfSizes(session, number, part), record));
-    WELLSPACE_RETURN_IF_ERROR(statements_->insert_sizes.Run());
     ++part;
+    return statements_->insert_sizes.Run();
+  };
+  for (const store::v1::SizesRecord& sizes : change.sizes->parts) {
+    WELLSPACE_RETURN_IF_ERROR(write(sizes));
+  }
+  const StoredSizes::InTurn& in_turn = change.sizes->in_turn;
+  for (size_t i = 0; i < in_turn.count; ++i) {
+    WELLSPACE_RETURN_IF_ERROR(write(in_turn.make(i)));
   }
   return absl::OkStatus();
 }

@@ -93,9 +93,9 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     return 0;
   }
   fuzz::Require(receiver.has_parameters(), "a complete call has parameters");
-  server::PointChunks chunks = receiver.TakePoints();
-  fuzz::Require(chunks.coordinate_count() == receiver.point_count() * receiver.parameters().dimension,
-                "coordinates are counted");
+  receiver.FlattenSizes(core::RunContext());
+  server::NumberChunks chunks = receiver.TakePoints();
+  fuzz::Require(chunks.count() == receiver.point_count() * receiver.parameters().dimension, "coordinates are counted");
   const std::vector<double> points = chunks.Flatten(core::RunContext());
   fuzz::Require(points.size() == sent.size() &&
                     (sent.empty() || std::memcmp(points.data(), sent.data(), sent.size() * sizeof(double)) == 0),

@@ -14,6 +14,7 @@
 #include "server/calls/request_stream.h"
 #include "server/calls/wire.h"
 #include "server/jobs/job_pool.h"
+#include "server/jobs/job_size.h"
 #include "server/jobs/memory_budget.h"
 #include "server/services/meshing/cloud_receiver.h"
 #include "server/wire/errors.h"
@@ -33,12 +34,12 @@ class CloudCall : public RequestStream<Call<Reactor>> {
       : RequestStream<Call<Reactor>>(environment, context), receiver_(environment.options) {}
 
   // On a worker: works, and hands over what came of it.
-  virtual void Work(PointChunks& points, Job& job) = 0;
+  virtual void Work(NumberChunks& points, Job& job) = 0;
 
   // The following are called with mutex_ held, and want it to be held when they are called.
 
   // Whether what Work does with `points` takes about a second at most.
-  virtual bool IsSmall(const PointChunks& points) const = 0;
+  virtual bool IsSmall(const NumberChunks& points) const = 0;
   // The parameters have come, with `request`.
   virtual void OnParameters(const Request& /*request*/) {}
   // Of the mesh, for the log; 0 when there is none.
@@ -53,7 +54,7 @@ class CloudCall : public RequestStream<Call<Reactor>> {
   }
   // Null before it is queued.
   const std::shared_ptr<Job>& job() const { return job_; }
-  // Constant once there is a job.
+  // Constant once there is a job, but for many sizes at points, which Work finds there.
   const core::MeshParameters& parameters() const { return receiver_.parameters(); }
   const FeatureStore& features() const { return receiver_.features(); }
 
@@ -108,14 +109,23 @@ void CloudCall<Reactor, Request>::SubmitJob() {
     this->End(std::move(status));
     return;
   }
-  (void)received_.Resize(receiver_.held_bytes());  // no more than it was
+  (void)received_.Resize(receiver_.held_bytes());                         // no more than it was
+  const bool has_many_sizes = receiver_.size_count() > kMostSmallPoints;  // too many to be copied here
+  if (!has_many_sizes) {
+    receiver_.FlattenSizes(core::RunContext());
+  }
   // std::function wants to be copied, points do not.
-  auto points = std::make_shared<PointChunks>(receiver_.TakePoints());
+  auto points = std::make_shared<NumberChunks>(receiver_.TakePoints());
   absl::StatusOr<std::shared_ptr<Job>> job = this->environment().jobs.Submit(
       {.tenant = this->caller().tenant,
-       .is_small = IsSmall(*points),
+       .is_small = !has_many_sizes && IsSmall(*points),
        .held = std::move(received_),
-       .work = [self = this->template SharedAs<CloudCall>(), points](Job& running) { self->Work(*points, running); }});
+       .work = [self = this->template SharedAs<CloudCall>(), points, has_many_sizes](Job& running) {
+         if (has_many_sizes) {
+           self->receiver_.FlattenSizes(running.context());
+         }
+         self->Work(*points, running);
+       }});
   if (!job.ok()) {
     this->End(std::move(job).status());
     return;

@@ -7,34 +7,6 @@
 
 namespace wellspace::server {
 
-void PointChunks::Append(google::protobuf::RepeatedField<double>* coordinates) {
-  if (coordinates->empty()) {
-    return;  // endless empty chunks must not cost memory
-  }
-  coordinate_count_ += coordinates->size();
-  chunks_.emplace_back().Swap(coordinates);
-}
-
-std::vector<double> PointChunks::Copy() const {
-  std::vector<double> coordinates;
-  coordinates.reserve(coordinate_count_);
-  for (const google::protobuf::RepeatedField<double>& chunk : chunks_) {
-    coordinates.insert(coordinates.end(), chunk.begin(), chunk.end());
-  }
-  return coordinates;
-}
-
-std::vector<double> PointChunks::Flatten(const core::RunContext& context) {
-  std::vector<double> coordinates;
-  coordinates.reserve(coordinate_count_);
-  while (!chunks_.empty() && !context.IsCancelled()) {
-    coordinates.insert(coordinates.end(), chunks_.front().begin(), chunks_.front().end());
-    chunks_.pop_front();
-  }
-  coordinate_count_ = 0;
-  return coordinates;
-}
-
 template <typename Request>
 absl::Status CloudReceiver::Accept(Request* request) {
   switch (request->request_case()) {
@@ -47,7 +19,7 @@ absl::Status CloudReceiver::Accept(Request* request) {
     case Request::kFaces:
       return AcceptFaces(request->faces());
     case Request::kSizeSamples:
-      return AcceptSizes(request->size_samples());
+      return AcceptSizes(request->mutable_size_samples());
     case Request::REQUEST_NOT_SET:
       break;
   }
@@ -66,7 +38,6 @@ absl::Status CloudReceiver::AcceptEnd() {
   if (!features_.IsEmpty()) {
     WELLSPACE_RETURN_IF_ERROR(ValidateForDomain(parameters_, features_.View()));
   }
-  parameters_.size_samples = sizes_.Take();
   return absl::OkStatus();
 }
 
@@ -113,13 +84,13 @@ absl::Status CloudReceiver::AcceptFaces(const v1::FaceOptions& options) {
   return absl::OkStatus();
 }
 
-absl::Status CloudReceiver::AcceptSizes(const v1::SizeSamples& chunk) {
+absl::Status CloudReceiver::AcceptSizes(v1::SizeSamples* chunk) {
   if (!has_parameters_) {
     return MakeError(v1::ERROR_REASON_PARAMETERS_MISSING,
                      "size_samples came before the parameters; send the parameters first", "parameters");
   }
-  WELLSPACE_RETURN_IF_ERROR(CheckSizes(chunk, sizes_.count(), parameters_.dimension, "size_samples"));
-  WELLSPACE_RETURN_IF_ERROR(CheckCount(sizes_.count() + chunk.sizes_size(), "samples of sizes"));
+  WELLSPACE_RETURN_IF_ERROR(CheckSizes(*chunk, sizes_.count(), parameters_.dimension, "size_samples"));
+  WELLSPACE_RETURN_IF_ERROR(CheckCount(sizes_.count() + chunk->sizes_size(), "samples of sizes"));
   sizes_.Append(chunk);
   return absl::OkStatus();
 }

@@ -3,42 +3,21 @@
 #define WELLSPACE_SERVER_SERVICES_MESHING_CLOUD_RECEIVER_H_
 
 #include <cstdint>
-#include <deque>
 #include <utility>
-#include <vector>
 
 #include "absl/status/status.h"
+#include "core/base/run_context.h"
 #include "core/mesher.h"
-#include "google/protobuf/repeated_field.h"
 #include "server/base/options.h"
 #include "server/sessions/feature_store.h"
+#include "server/sessions/number_chunks.h"
 #include "server/sessions/size_store.h"
 #include "wellspace/v1/meshing.pb.h"
 
 namespace wellspace::server {
 
-// Points as they came, chunk by chunk. Movable.
-//
-// Thread safety: thread-compatible.
-class PointChunks {
- public:
-  // Takes over what is in `coordinates`, without copying.
-  void Append(google::protobuf::RepeatedField<double>* coordinates);
-
-  uint64_t coordinate_count() const { return coordinate_count_; }
-
-  // All coordinates in order.
-  std::vector<double> Copy() const;
-  // The same; the chunks are freed as they are copied. Leaves this empty. Of a cancelled run, not all.
-  std::vector<double> Flatten(const core::RunContext& context);
-
- private:
-  std::deque<google::protobuf::RepeatedField<double>> chunks_;
-  uint64_t coordinate_count_ = 0;
-};
-
 // Checks the order and the contents of the requests of one call and keeps the points. Fast enough for a reaction: no
-// coordinate of a point is looked at or copied. Segments and sizes, which are few, are.
+// coordinate of a point is looked at or copied. Segments, which are few, are, and sizes are looked at.
 //
 // Thread safety: thread-compatible.
 // Invariants: never holds more than options.max_points points, segments, seeds or samples of sizes.
@@ -54,7 +33,7 @@ class CloudReceiver {
   template <typename Request>
   absl::Status Accept(Request* request);
 
-  // To be called when the client has ended its stream: from then on parameters() has the sizes at points.
+  // To be called when the client has ended its stream, and before FlattenSizes.
   //
   // Errors:     PARAMETERS_MISSING; INVALID_PARAMETERS, of those that a domain with segments does not have.
   absl::Status AcceptEnd();
@@ -63,22 +42,24 @@ class CloudReceiver {
   const core::MeshParameters& parameters() const { return parameters_; }
   uint64_t point_count() const { return point_count_; }
   // Of what it holds.
-  uint64_t held_bytes() const {
-    return points_.coordinate_count() * sizeof(double) + features_.bytes() + sizes_.bytes() +
-           (parameters_.size_samples == nullptr ? 0 : parameters_.size_samples->bytes());
-  }
+  uint64_t held_bytes() const { return points_.bytes() + features_.bytes() + sizes_.bytes(); }
+  uint64_t size_count() const { return sizes_.count(); }
   // Constant once the client has ended its stream.
   const FeatureStore& features() const { return features_; }
 
   // Hands over the points.
-  PointChunks TakePoints() { return std::exchange(points_, PointChunks()); }
+  NumberChunks TakePoints() { return std::exchange(points_, NumberChunks()); }
+  // From then on parameters() has the sizes at points, unless the run is cancelled. To be called once.
+  //
+  // Complexity: O(sizes): they are copied, so not for a reaction where they are many.
+  void FlattenSizes(const core::RunContext& context) { parameters_.size_samples = sizes_.Take(context); }
 
  private:
   absl::Status AcceptParameters(const v1::MeshParameters& message);
   absl::Status AcceptPoints(v1::PointChunk* chunk);
   absl::Status AcceptSegments(const v1::SegmentChunk& chunk);
   absl::Status AcceptFaces(const v1::FaceOptions& options);
-  absl::Status AcceptSizes(const v1::SizeSamples& chunk);
+  absl::Status AcceptSizes(v1::SizeSamples* chunk);
   // Checks that `field` may come now.
   absl::Status CheckInDomain(const char* field) const;
   // Checks that this may hold `count` of `what`.
@@ -88,7 +69,7 @@ class CloudReceiver {
   bool has_parameters_ = false;
   core::MeshParameters parameters_;
   uint64_t point_count_ = 0;
-  PointChunks points_;
+  NumberChunks points_;
   FeatureStore features_;
   SizeStore sizes_;
 };

@@ -11,7 +11,7 @@
 
 namespace wellspace::server {
 
-void EstimateMeshCall::Work(PointChunks& points, Job& job) {
+void EstimateMeshCall::Work(NumberChunks& points, Job& job) {
   core::MeshEstimate estimate{};
   absl::Status status = RunGuarded([&] {
     const std::vector<double> coordinates = points.Flatten(job.context());
@@ -34,9 +34,9 @@ void EstimateMeshCall::Work(PointChunks& points, Job& job) {
   End(absl::OkStatus());
 }
 
-bool EstimateMeshCall::IsSmall(const PointChunks& points) const {
+bool EstimateMeshCall::IsSmall(const NumberChunks& points) const {
   const int dimension = parameters().dimension;
-  return IsSmallEstimate(dimension, points.coordinate_count() / dimension);
+  return IsSmallEstimate(dimension, points.count() / dimension);
 }
 
 }  // namespace wellspace::server

@@ -18,8 +18,8 @@ class EstimateMeshCall final : public CloudCall<grpc::ServerReadReactor<grpc::By
       : CloudCall(environment, context), response_(response) {}
 
  private:
-  void Work(PointChunks& points, Job& job) override;
-  bool IsSmall(const PointChunks& points) const override;
+  void Work(NumberChunks& points, Job& job) override;
+  bool IsSmall(const NumberChunks& points) const override;
   uint64_t VertexCount() const override { return vertices_; }
 
   grpc::ByteBuffer* const response_;  // guarded by mutex_; gRPC's from Finish on

@@ -12,7 +12,7 @@
 
 namespace wellspace::server {
 
-void MeshPointsCall::Work(PointChunks& points, Job& job) {
+void MeshPointsCall::Work(NumberChunks& points, Job& job) {
   std::shared_ptr<MeshChunks> mesh;
   absl::Status status = RunGuarded([&] {
     const std::vector<double> coordinates = points.Flatten(job.context());
@@ -41,8 +41,8 @@ void MeshPointsCall::Work(PointChunks& points, Job& job) {
   WriteNext();
 }
 
-bool MeshPointsCall::IsSmall(const PointChunks& points) const {
-  return points.coordinate_count() <= kMostSmallPoints * parameters().dimension &&
+bool MeshPointsCall::IsSmall(const NumberChunks& points) const {
+  return points.count() <= kMostSmallPoints * parameters().dimension &&
          features().segment_count() <= kMostSmallPoints && IsSmallMesh(parameters(), points.Copy());
 }
 

@@ -29,8 +29,8 @@ class MeshPointsCall final
       : ResponseStream(environment, context) {}
 
  private:
-  void Work(PointChunks& points, Job& job) override;
-  bool IsSmall(const PointChunks& points) const override;
+  void Work(NumberChunks& points, Job& job) override;
+  bool IsSmall(const NumberChunks& points) const override;
   void OnParameters(const v1::MeshPointsRequest& request) override {
     with_boundary_ = request.with_boundary();
     ScheduleTick();

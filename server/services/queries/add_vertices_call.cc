@@ -78,6 +78,13 @@ void AddVerticesCall::Submit(const IdentifiedRequest& identified, RequestIds::Do
     done({expected_revision.status(), ""});
     return;
   }
+  // The request as gRPC has it, and as the job does.
+  const uint64_t bytes = 2 * (request_->points_size() * sizeof(double) + request_->near_size() * sizeof(uint32_t));
+  absl::StatusOr<MemoryReservation> held = environment().memory.Reserve(bytes, "the vertices to be added");
+  if (!held.ok()) {
+    done({std::move(held).status(), ""});
+    return;
+  }
   const Session::Size size = (*session)->GetSize(0);
   const bool is_small =
       IsSmallAddition(request_->points_size() / (*session)->dimension(), size.vertices, size.replayed_steps);
@@ -90,6 +97,7 @@ void AddVerticesCall::Submit(const IdentifiedRequest& identified, RequestIds::Do
   absl::StatusOr<std::shared_ptr<Job>> job =
       environment().jobs.Submit({.tenant = caller().tenant,
                                  .is_small = is_small,
+                                 .held = *std::move(held),
                                  .work = [addition, done, &create_mesher = environment().create_mesher](Job& running) {
                                    done(Add(*addition, create_mesher, running));
                                  }});

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "absl/time/time.h"
 #include "core/base/status_macros.h"
 #include "server/calls/unary_call.h"
+#include "server/jobs/memory_budget.h"
 #include "server/services/page_token.h"
 #include "server/services/resource_names.h"
 #include "server/services/session_fields.h"
@@ -120,7 +122,11 @@ absl::Status Remove(const CallEnvironment& environment, const Caller& caller, co
     response.set_committed_points(left.points);
     response.set_revision(left.revision);
   };
-  const std::vector<uint64_t> numbers(request.points().begin(), request.points().end());
+  // The request, of which the call has a copy, and the numbers in ascending order.
+  const auto count = static_cast<size_t>(request.points_size());
+  WELLSPACE_ASSIGN_OR_RETURN(const MemoryReservation memory,
+                             environment.memory.Reserve(2 * count * sizeof(uint64_t), "the points to be removed"));
+  const std::span<const uint64_t> numbers(request.points().data(), count);
   const auto answer = [&](const PointsLeft& left) {
     set_response(left);
     return identified.Answer(response);

@@ -59,7 +59,7 @@ absl::Status SetSizesCall::Take(grpc::ByteBuffer* bytes) {
   return TakeSamples(request);
 }
 
-absl::Status SetSizesCall::TakeSamples(const v1::SetSizesRequest& request) {
+absl::Status SetSizesCall::TakeSamples(v1::SetSizesRequest& request) {
   const uint64_t count = request.has_samples() ? request.samples().sizes_size() : request.vertex_sizes().sizes_size();
   if (const uint64_t all = sizes_.count() + count; all > environment().options.max_points) {
     return MakeError(v1::ERROR_REASON_TOO_MANY_POINTS,
@@ -69,10 +69,10 @@ absl::Status SetSizesCall::TakeSamples(const v1::SetSizesRequest& request) {
   if (request.has_samples()) {
     const int dimension = session_->session().dimension();
     WELLSPACE_RETURN_IF_ERROR(CheckSizes(request.samples(), sizes_.count(), dimension, "samples"));
-    sizes_.Append(request.samples());
+    sizes_.Append(request.mutable_samples());
   } else {
     WELLSPACE_RETURN_IF_ERROR(CheckSizes(request.vertex_sizes(), sizes_.count(), "vertex_sizes"));
-    sizes_.Append(request.vertex_sizes());
+    sizes_.Append(request.mutable_vertex_sizes());
   }
   count_ = sizes_.count();
   return absl::OkStatus();
@@ -102,11 +102,12 @@ absl::Status SetSizesCall::Set(SizeStore sizes, bool of_vertices) {
   if (of_vertices) {
     WELLSPACE_RETURN_IF_ERROR(FindPoints(sizes));
   }
+  MemoryReservation received;  // the session sets memory aside for them, as far as it had none
   {
     std::lock_guard lock(mutex_);
-    memory_.Release();  // the session sets memory aside for them
+    received = std::move(memory_);
   }
-  return session_->session().SetSizes(sizes.Take(), expected_revision_);
+  return session_->session().SetSizes(sizes.Take(core::RunContext()), expected_revision_, &received);
 }
 
 absl::Status SetSizesCall::FindPoints(SizeStore& sizes) {

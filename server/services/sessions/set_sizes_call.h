@@ -37,7 +37,7 @@ class SetSizesCall final : public RequestStream<Call<grpc::ServerReadReactor<grp
   // The following want mutex_ to be held.
   // Takes the samples of the message in `bytes`. The first one says which session it is for.
   absl::Status Take(grpc::ByteBuffer* bytes);
-  absl::Status TakeSamples(const v1::SetSizesRequest& request);
+  absl::Status TakeSamples(v1::SetSizesRequest& request);
   // Sets memory aside for what has come and for the next message, which it then reads.
   void ReserveAndRead();
   // Sets memory aside for what has come, and for `more` bytes.
@@ -45,7 +45,8 @@ class SetSizesCall final : public RequestStream<Call<grpc::ServerReadReactor<grp
   // Errors:     MEMORY_LIMIT.
   absl::Status ReserveFor(uint64_t more);
 
-  // Gives `sizes` to the session, on a thread that may wait for the disk. `of_vertices`: points are to be found.
+  // Gives `sizes` to the session, on a thread that may wait for the disk. `of_vertices`: points are to be found. Until
+  // the session has them, what was set aside for them stays.
   absl::Status Set(SizeStore sizes, bool of_vertices);
   absl::Status FindPoints(SizeStore& sizes);
 

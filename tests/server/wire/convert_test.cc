@@ -285,8 +285,8 @@ TEST(CloudReceiver, CollectsChunksInOrder) {
   ASSERT_TRUE(Accept(receiver, PointsRequest({4, 5, 6, 7, 8, 9})).ok());
   ASSERT_TRUE(receiver.AcceptEnd().ok());
   EXPECT_EQ(receiver.point_count(), 3u);
-  PointChunks points = receiver.TakePoints();
-  EXPECT_EQ(points.coordinate_count(), 9u);
+  NumberChunks points = receiver.TakePoints();
+  EXPECT_EQ(points.count(), 9u);
   EXPECT_THAT(points.Flatten(core::RunContext()), ElementsAre(1, 2, 3, 4, 5, 6, 7, 8, 9));
   EXPECT_TRUE(points.Flatten(core::RunContext()).empty());
   EXPECT_TRUE(receiver.TakePoints().Flatten(core::RunContext()).empty());
