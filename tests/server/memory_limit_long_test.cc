@@ -50,7 +50,11 @@ void ExpectDoneOrRefused(const absl::Status& status) {
   EXPECT_TRUE(status.ok() || absl::IsResourceExhausted(status) || absl::IsDeadlineExceeded(status)) << status;
 }
 
-client::CallOptions Patient() { return {.timeout = absl::Minutes(2)}; }
+client::CallOptions Patient() {
+  client::CallOptions call;
+  call.timeout = absl::Minutes(2);
+  return call;
+}
 
 // A ring of so many points.
 std::vector<double> Ring(size_t count) {
@@ -145,7 +149,9 @@ TEST_P(MemoryLimitOfSessions, SegmentsAndPointsThatAreRemovedAndAdded) {
   constexpr size_t kSegments = 400'000;
   Limited limited(GetParam());
   client::Client client = limited.client();
-  const absl::StatusOr<client::Session> session = client.CreateSession({.parameters = {.dimension = 2}});
+  client::SessionOptions options;
+  options.parameters.dimension = 2;
+  const absl::StatusOr<client::Session> session = client.CreateSession(options);
   ASSERT_TRUE(session.ok()) << session.status();
   std::vector<double> points = Ring(kSegments);
   for (int i = 0; i < 600'000; ++i) {  // inside, of which some are taken out
