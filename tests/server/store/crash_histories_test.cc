@@ -13,6 +13,7 @@
 #include "gtest/gtest.h"
 #include "server/store/back_up.h"
 #include "server/store/check_data.h"
+#include "server/store/data_folder.h"
 #include "tests/server/store/simulated_disk.h"
 #include "tests/server/store/store_life.h"
 #include "tests/support/clouds.h"
@@ -153,6 +154,37 @@ TEST(BackUp, OutlivesALossOfPower) {
     }
     EXPECT_TRUE(is_found) << "without the synchronisation of " << end;
   }
+}
+
+// Has a file that no session names set aside, and loses power then. Whether it is still there, in either place.
+bool IsKeptOverALossOfPower(bool synchronises, uint64_t seed) {
+  const DataPaths paths{StoreLife::kFolder};
+  const std::string name = "abcdef.mesh-3";
+  SimulatedDisk disk;
+  {
+    StoreLife life(disk);
+    EXPECT_TRUE(life.Open().ok());
+    const auto file = disk.files().Open(paths.files() + "/" + name, FileSystem::Mode::kCreateOrWrite);
+    EXPECT_TRUE((*file)->Synchronize().ok() && disk.files().SynchronizeFolder(paths.files()).ok());
+    if (!synchronises) {
+      disk.OmitSynchronize(paths.root);
+    }
+    const auto garbage = life.log()->RemoveGarbage();
+    EXPECT_TRUE(garbage.ok() && garbage->set_aside.size() == 1);
+  }
+  disk.Restart(seed % 2 == 0 ? Loss::kAll : Loss::kSome, seed);
+  const std::vector<std::string> lost = disk.List(paths.lost());
+  return disk.Has(paths.files() + "/" + name) ||
+         std::ranges::any_of(lost, [&](const std::string& kept) { return kept.starts_with(name); });
+}
+
+TEST(LostFiles, OutliveALossOfPower) {
+  bool is_found = false;
+  for (uint64_t seed = 0; seed < 50; ++seed) {
+    EXPECT_TRUE(IsKeptOverALossOfPower(/*synchronises=*/true, seed)) << seed;
+    is_found |= !IsKeptOverALossOfPower(/*synchronises=*/false, seed);
+  }
+  EXPECT_TRUE(is_found) << "without the synchronisation of the folder that has lost/";
 }
 
 struct PlantedBug {
