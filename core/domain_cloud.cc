@@ -57,7 +57,7 @@ uint64_t DomainCloudBytes(uint64_t points, uint64_t segments, uint64_t seeds) {
 }
 
 absl::StatusOr<DomainCloud> MakeDomainCloud(std::span<const double> points, const Features& features, const Box<2>& box,
-                                            int threads, const RunContext& context) {
+                                            uint64_t max_vertices, int threads, const RunContext& context) {
   const bool is_in_box = features.faces == FaceRule::kBox;
   if (is_in_box) {
     WELLSPACE_ASSIGN_OR_RETURN(const Domain<2> given, Domain<2>::Of(box));
@@ -76,7 +76,7 @@ absl::StatusOr<DomainCloud> MakeDomainCloud(std::span<const double> points, cons
   WELLSPACE_RETURN_IF_ERROR(CheckPoints<2>(domain, points, context));
   WELLSPACE_ASSIGN_OR_RETURN(PlanarGraph graph,
                              MakePlanarGraph(points, features, is_in_box ? &box : nullptr,
-                                             domain.MinSeparation() / domain.scale, threads, context));
+                                             domain.MinSeparation() / domain.scale, max_vertices, threads, context));
   // Crossings may have made many more of them.
   WELLSPACE_RETURN_IF_ERROR(
       context.AllowMemory(DomainCloudBytes(graph.points.size(), graph.segments.size(), features.seeds.size())));
@@ -93,7 +93,7 @@ absl::StatusOr<DomainCloud> MakeDomainCloud(std::span<const double> points, cons
   for (Face& face : faces.faces) {
     face.max_area *= domain.scale * domain.scale;
   }
-  KeepMeshed(sorted_of, graph, faces);
+  WELLSPACE_RETURN_IF_ERROR(KeepMeshed(sorted_of, graph, faces, context));
   return DomainCloud{domain, std::move(cloud), std::make_unique<PlanarDomain>(std::move(graph), std::move(faces)),
                      meshed.dropped};
 }

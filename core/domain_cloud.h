@@ -38,7 +38,7 @@ uint64_t DomainCloudBytes(uint64_t points, uint64_t segments, uint64_t seeds);
 // Errors:     those of CheckPoints, MakePlanarGraph, FindFaces and SortCloud; RESOURCE_EXHAUSTED, or another of the
 //             context's lender, when crossings make more of them than there is memory for.
 absl::StatusOr<DomainCloud> MakeDomainCloud(std::span<const double> points, const Features& features, const Box<2>& box,
-                                            int threads, const RunContext& context);
+                                            uint64_t max_vertices, int threads, const RunContext& context);
 
 }  // namespace wellspace::core
 

@@ -128,7 +128,8 @@ absl::Status DomainMesher::Initialize(const MeshParameters& parameters, std::spa
       box = {PointAt<2>(parameters.domain_low, 0), PointAt<2>(parameters.domain_high, 0)};
     }
   }
-  WELLSPACE_ASSIGN_OR_RETURN(DomainCloud made, MakeDomainCloud(points, features, box, parameters.threads, context));
+  WELLSPACE_ASSIGN_OR_RETURN(
+      DomainCloud made, MakeDomainCloud(points, features, box, VertexBudget(parameters), parameters.threads, context));
   domain_ = made.domain;
   planar_ = std::move(made.planar);
   least_area_ = LeastAreaOf(*planar_, features.seeds, domain_.scale);

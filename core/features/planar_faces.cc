@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/cancellable_sort.h"
 #include "core/base/status_macros.h"
 #include "core/features/place.h"
 #include "core/features/polygon_seeds.h"
@@ -19,6 +20,9 @@ namespace wellspace::core {
 namespace {
 
 constexpr uint32_t kNone = GraphSegment::kNoPolygon;
+
+// Half-edges that are sorted without a look at the context.
+constexpr std::ptrdiff_t kFewAround = 1024;
 
 // Sets of numbers that are joined.
 class UnionFind {
@@ -54,10 +58,10 @@ class FaceFinder {
         return absl::InvalidArgumentError(absl::StrCat("seeds[", i, "]: its coordinates are not finite"));
       }
     }
-    SortAround();
-    FollowCycles();
+    WELLSPACE_RETURN_IF_ERROR(SortAround());
+    WELLSPACE_RETURN_IF_ERROR(FollowCycles());
     WELLSPACE_RETURN_IF_ERROR(Sweep());
-    NumberFaces();
+    WELLSPACE_RETURN_IF_ERROR(NumberFaces());
     WELLSPACE_RETURN_IF_ERROR(ApplyRule());
     WELLSPACE_RETURN_IF_ERROR(ApplySeeds());
     if (std::none_of(out_.faces.begin(), out_.faces.end(), [](const Face& face) { return face.is_meshed; })) {
@@ -79,9 +83,14 @@ class FaceFinder {
   uint32_t TargetOf(HalfEdge h) const { return OriginOf(TwinOf(h)); }
   const Point<2>& At(uint32_t point) const { return graph_.points[point]; }
 
+  // A look at the context in a loop that makes short steps, of which this is one.
+  absl::Status CheckAt(size_t step) const {
+    return step % kStepsBetweenChecks == 0 ? context_.Check() : absl::OkStatus();
+  }
+
   // Puts the half-edges around each point in counterclockwise order, from the direction of minus the second axis on:
   // first those that lead to greater points.
-  void SortAround() {
+  absl::Status SortAround() {
     const size_t points = graph_.points.size();
     out_.first_around.assign(points + 1, 0);
     for (HalfEdge h = 0; h < half_edge_count(); ++h) {
@@ -93,29 +102,43 @@ class FaceFinder {
     for (HalfEdge h = 0; h < half_edge_count(); ++h) {
       out_.around[next[OriginOf(h)]++] = h;
     }
+    std::vector<HalfEdge> own;
     for (uint32_t p = 0; p < points; ++p) {
+      WELLSPACE_RETURN_IF_ERROR(CheckAt(p));
       const auto leads_up = [&](HalfEdge h) { return At(p) < At(TargetOf(h)); };
-      std::sort(out_.around.begin() + out_.first_around[p], out_.around.begin() + out_.first_around[p + 1],
-                [&](HalfEdge h, HalfEdge k) {
-                  return leads_up(h) != leads_up(k)
-                             ? leads_up(h)
-                             : Orientation<2>({At(p), At(TargetOf(h)), At(TargetOf(k))}).sign == Sign::kPositive;
-                });
+      const auto is_before = [&](HalfEdge h, HalfEdge k) {
+        return leads_up(h) != leads_up(k)
+                   ? leads_up(h)
+                   : Orientation<2>({At(p), At(TargetOf(h)), At(TargetOf(k))}).sign == Sign::kPositive;
+      };
+      const auto begin = out_.around.begin() + out_.first_around[p];
+      const auto end = out_.around.begin() + out_.first_around[p + 1];
+      if (end - begin <= kFewAround) {
+        std::sort(begin, end, is_before);
+        continue;
+      }
+      own.assign(begin, end);
+      WELLSPACE_RETURN_IF_ERROR(CancellableSort(own, is_before, context_));
+      std::copy(own.begin(), own.end(), begin);
     }
+    return absl::OkStatus();
   }
 
   // Numbers the cycles of half-edges around faces: each keeps its face on the left.
-  void FollowCycles() {
+  absl::Status FollowCycles() {
     std::vector<uint32_t> place(half_edge_count());  // in `around`
     for (uint32_t i = 0; i < out_.around.size(); ++i) {
       place[out_.around[i]] = i;
     }
     cycle_of_.assign(half_edge_count(), kNone);
+    size_t steps = 0;
     for (HalfEdge first = 0; first < half_edge_count(); ++first) {
+      WELLSPACE_RETURN_IF_ERROR(CheckAt(steps++));
       if (cycle_of_[first] != kNone) {
         continue;
       }
       for (HalfEdge h = first; cycle_of_[h] == kNone;) {
+        WELLSPACE_RETURN_IF_ERROR(CheckAt(steps++));
         cycle_of_[h] = cycles_;
         // At its target, the next one clockwise from the way back.
         const uint32_t at = TargetOf(h);
@@ -124,6 +147,7 @@ class FaceFinder {
       }
       ++cycles_;
     }
+    return absl::OkStatus();
   }
 
   // Orders segments that a line across the first axis meets by the second axis, and places on that line to them. All
@@ -159,11 +183,12 @@ class FaceFinder {
     const auto at = [&](uint32_t event) { return event < points ? At(event) : seeds_[event - points].at; };
     std::vector<uint32_t> events(below_.size());
     std::iota(events.begin(), events.end(), 0);
-    std::sort(events.begin(), events.end(),
-              [&](uint32_t i, uint32_t j) { return std::pair(at(i), i) < std::pair(at(j), j); });
+    const auto is_before = [&](uint32_t i, uint32_t j) { return std::pair(at(i), i) < std::pair(at(j), j); };
+    WELLSPACE_RETURN_IF_ERROR(CancellableSort(events, is_before, context_));
     UnionFind components(points);
-    for (const GraphSegment& segment : graph_.segments) {
-      components.Join(segment.a, segment.b);
+    for (size_t s = 0; s < graph_.segments.size(); ++s) {
+      WELLSPACE_RETURN_IF_ERROR(CheckAt(s));
+      components.Join(graph_.segments[s].a, graph_.segments[s].b);
     }
     std::vector<bool> has_begun(points);
     std::set<uint32_t, IsBelow> met(IsBelow{this});
@@ -222,7 +247,7 @@ class FaceFinder {
   }
 
   // Joins the cycles of one face: that around a component from outside with those of the face which it lies in.
-  void NumberFaces() {
+  absl::Status NumberFaces() {
     const uint32_t unbounded = 0;  // cycles are numbered from 1 here
     UnionFind joined(cycles_ + 1);
     const auto face_below = [&](uint32_t event) {
@@ -244,16 +269,19 @@ class FaceFinder {
     face_of(unbounded);
     out_.left_face.resize(half_edge_count());
     for (HalfEdge h = 0; h < half_edge_count(); ++h) {
+      WELLSPACE_RETURN_IF_ERROR(CheckAt(h));
       out_.left_face[h] = face_of(cycle_of_[h] + 1);
     }
     const auto points = static_cast<uint32_t>(graph_.points.size());
     out_.point_face.resize(points);
     for (uint32_t p = 0; p < points; ++p) {
+      WELLSPACE_RETURN_IF_ERROR(CheckAt(p));
       out_.point_face[p] = out_.Around(p).empty() ? face_of(face_below(p)) : PlanarFaces::kOnSegments;
     }
     for (size_t i = 0; i < seeds_.size(); ++i) {
       seed_face_.push_back(face_of(face_below(static_cast<uint32_t>(points + i))));
     }
+    return absl::OkStatus();
   }
 
   absl::Status ApplyRule() {
@@ -266,15 +294,18 @@ class FaceFinder {
     // From the unbounded face on across segments.
     std::vector<std::vector<HalfEdge>> sides(out_.faces.size());
     for (HalfEdge h = 0; h < half_edge_count(); ++h) {
+      WELLSPACE_RETURN_IF_ERROR(CheckAt(h));
       sides[out_.left_face[h]].push_back(h);
     }
     std::vector<bool> is_known(out_.faces.size());
     std::vector<uint32_t> pending = {0};
     is_known[0] = true;
+    size_t steps = 0;
     while (!pending.empty()) {
       const uint32_t face = pending.back();
       pending.pop_back();
       for (const HalfEdge h : sides[face]) {
+        WELLSPACE_RETURN_IF_ERROR(CheckAt(steps++));
         const uint32_t beyond = out_.left_face[TwinOf(h)];
         const GraphSegment& segment = graph_.segments[SegmentOf(h)];
         const bool is_odd = out_.faces[face].is_meshed != (segment.rings % 2 == 1);
@@ -360,7 +391,8 @@ std::vector<bool> FindMeshedPoints(const PlanarGraph& graph, const PlanarFaces& 
   return is_meshed;
 }
 
-void KeepMeshed(std::span<const uint32_t> permutation, PlanarGraph& graph, PlanarFaces& faces) {
+absl::Status KeepMeshed(std::span<const uint32_t> permutation, PlanarGraph& graph, PlanarFaces& faces,
+                        const RunContext& context) {
   const std::vector<bool> is_kept = FindMeshedPoints(graph, faces);
   std::vector<uint32_t> number(graph.points.size(), kNone);
   PlanarGraph kept;
@@ -390,7 +422,8 @@ void KeepMeshed(std::span<const uint32_t> permutation, PlanarGraph& graph, Plana
     }
   }
   const auto ends_of = [&](uint32_t s) { return std::pair(number[graph.segments[s].a], number[graph.segments[s].b]); };
-  std::sort(order.begin(), order.end(), [&](uint32_t s, uint32_t t) { return ends_of(s) < ends_of(t); });
+  WELLSPACE_RETURN_IF_ERROR(CancellableSort(
+      order, [&](uint32_t s, uint32_t t) { return ends_of(s) < ends_of(t); }, context));
   std::vector<uint32_t> new_segment(graph.segments.size(), kNone);
   for (const uint32_t s : order) {
     new_segment[s] = static_cast<uint32_t>(kept.segments.size());
@@ -411,6 +444,7 @@ void KeepMeshed(std::span<const uint32_t> permutation, PlanarGraph& graph, Plana
   }
   graph = std::move(kept);
   faces = std::move(kept_faces);
+  return absl::OkStatus();
 }
 
 }  // namespace wellspace::core

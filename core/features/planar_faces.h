@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "core/base/run_context.h"
 #include "core/features/features.h"
@@ -60,7 +61,9 @@ absl::StatusOr<PlanarFaces> FindFaces(const PlanarGraph& graph, FaceRule rule, s
 // in the order of their ends.
 //
 // Complexity: O((n + m) log m).
-void KeepMeshed(std::span<const uint32_t> permutation, PlanarGraph& graph, PlanarFaces& faces);
+// Errors:     CANCELLED, DEADLINE_EXCEEDED; graph and faces are then as before.
+absl::Status KeepMeshed(std::span<const uint32_t> permutation, PlanarGraph& graph, PlanarFaces& faces,
+                        const RunContext& context);
 // Whether each point stays.
 std::vector<bool> FindMeshedPoints(const PlanarGraph& graph, const PlanarFaces& faces);
 

@@ -1,7 +1,9 @@
 #include "core/features/planar_graph.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <numeric>
 #include <optional>
@@ -9,9 +11,11 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/cancellable_sort.h"
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
 #include "core/features/near_segment.h"
+#include "core/features/overlaps.h"
 #include "core/features/place.h"
 #include "core/features/polygon_seeds.h"
 #include "core/features/segment_pairs.h"
@@ -24,6 +28,13 @@ namespace {
 // Faults that an error names; and so many at most are looked for.
 constexpr size_t kNamed = 10;
 constexpr size_t kMostFaults = 1000;
+// Pairs of features that may meet, if the vertices that they make are no more. Crossings of many segments in one place
+// are many pairs.
+constexpr size_t kMostPairs = size_t{1} << 24;
+// Faults that are looked at for equal ones.
+constexpr size_t kFaultsBetweenLooks = size_t{1} << 16;
+// Segments of a group of which those with a common end are looked for.
+constexpr size_t kLargeGroup = 64;
 // Rounds of splitting, each of which may bend segments over others, before it is given up.
 constexpr int kMostRounds = 64;
 
@@ -34,8 +45,9 @@ Sign SideOf(const Point<2>& a, const Point<2>& b, const Point<2>& p) { return Or
 // Whether `p`, a point of the line through `a` and `b`, lies strictly between them.
 bool IsBetween(const Point<2>& a, const Point<2>& b, const Point<2>& p) { return (a < p && p < b) || (b < p && p < a); }
 
-// Where two segments that cross do so, rounded.
-Point<2> CrossingOf(const Point<2>& a, const Point<2>& b, const Point<2>& c, const Point<2>& d) {
+// Where two segments that cross do so, rounded. REQUIRES: {a, b} < {c, d}, a < b, and c < d, so that it does not depend
+// on which comes first.
+Point<2> CrossingFrom(const Point<2>& a, const Point<2>& b, const Point<2>& c, const Point<2>& d) {
   const Point<2> along = Difference<2>(b, a);
   const Point<2> other = Difference<2>(d, c);
   const Point<2> from = Difference<2>(c, a);
@@ -47,7 +59,7 @@ Point<2> CrossingOf(const Point<2>& a, const Point<2>& b, const Point<2>& c, con
 
 // What is wrong between a segment and a point, or another segment.
 struct Fault {
-  enum class Kind : uint8_t { kOn, kNear, kCrossing };
+  enum class Kind : uint8_t { kOn, kNear, kCrossing, kNeedle };  // a needle: near, and joined to an end of the segment
 
   Kind kind = Kind::kOn;
   uint32_t segment = 0;  // of a crossing the lower of the two
@@ -59,28 +71,35 @@ struct Fault {
 // Makes the graph, step after step; in the coordinates as they are given, which the mesher scales later.
 class GraphMaker {
  public:
-  GraphMaker(const Features& features, double least_separation, int threads, const RunContext& context)
-      : features_(features), least_separation_(least_separation), context_(context), team_(threads) {}
+  GraphMaker(const Features& features, double least_separation, uint64_t max_vertices, int threads,
+             const RunContext& context)
+      : features_(features),
+        least_separation_(least_separation),
+        max_vertices_(max_vertices),
+        context_(context),
+        team_(threads) {}
 
   absl::StatusOr<PlanarGraph> Make(std::span<const double> points, const Box<2>* box) {
-    MergeEqualPoints(points);
+    WELLSPACE_RETURN_IF_ERROR(MergeEqualPoints(points));
     WELLSPACE_RETURN_IF_ERROR(TakeSegments());
     if (box != nullptr) {
       AddBox(*box);
     }
     WELLSPACE_RETURN_IF_ERROR(DropDuplicates());
+    WELLSPACE_RETURN_IF_ERROR(UniteOverlaps(graph_, context_));
     for (int round = 0;; ++round) {
-      WELLSPACE_ASSIGN_OR_RETURN(const std::vector<Fault> faults, FindFaults());
+      WELLSPACE_ASSIGN_OR_RETURN(std::vector<Fault> faults, FindFaults());
       if (faults.empty()) {
         break;
       }
+      WELLSPACE_RETURN_IF_ERROR(FindNeedles(faults));
       WELLSPACE_RETURN_IF_ERROR(CheckAllowed(faults));
       if (round == kMostRounds) {
         return absl::ResourceExhaustedError(
             absl::StrCat("segments: splitting them where they cross does not end after ", kMostRounds, " rounds; ",
                          Describe(faults[0]), "; move these apart, or round the coordinates to fewer digits"));
       }
-      SplitAt(faults);
+      WELLSPACE_RETURN_IF_ERROR(SplitAt(faults));
       WELLSPACE_RETURN_IF_ERROR(DropDuplicates());
     }
     return std::move(graph_);
@@ -89,19 +108,26 @@ class GraphMaker {
  private:
   const Point<2>& At(uint32_t point) const { return graph_.points[point]; }
 
-  void MergeEqualPoints(std::span<const double> points) {
+  // A look at the context in a loop that makes short steps, of which this is one.
+  absl::Status CheckAt(size_t step) const {
+    return step % kStepsBetweenChecks == 0 ? context_.Check() : absl::OkStatus();
+  }
+
+  absl::Status MergeEqualPoints(std::span<const double> points) {
     const auto count = static_cast<uint32_t>(points.size() / 2);
     std::vector<uint32_t> order(count);
     std::iota(order.begin(), order.end(), 0);
     const auto at = [&](uint32_t i) { return PointAt<2>(points, i); };
-    std::sort(order.begin(), order.end(),
-              [&](uint32_t i, uint32_t j) { return std::pair(at(i), i) < std::pair(at(j), j); });
+    const auto is_before = [&](uint32_t i, uint32_t j) { return std::pair(at(i), i) < std::pair(at(j), j); };
+    WELLSPACE_RETURN_IF_ERROR(CancellableSort(order, is_before, context_));
     std::vector<uint32_t> first(count);
     for (uint32_t k = 0; k < count; ++k) {
+      WELLSPACE_RETURN_IF_ERROR(CheckAt(k));
       first[order[k]] = k > 0 && at(order[k]) == at(order[k - 1]) ? first[order[k - 1]] : order[k];
     }
     graph_.point_of_input.resize(count);
     for (uint32_t i = 0; i < count; ++i) {
+      WELLSPACE_RETURN_IF_ERROR(CheckAt(i));
       if (first[i] == i) {
         graph_.point_of_input[i] = static_cast<uint32_t>(graph_.points.size());
         graph_.points.push_back(at(i));
@@ -111,6 +137,7 @@ class GraphMaker {
         ++graph_.counts.equal_points;
       }
     }
+    return absl::OkStatus();
   }
 
   absl::Status TakeSegments() {
@@ -118,6 +145,7 @@ class GraphMaker {
     WELLSPACE_ASSIGN_OR_RETURN(const std::vector<uint32_t> polygons, PolygonsOfSegments(features_, context_));
     graph_.seeds = static_cast<uint32_t>(features_.seeds.size());
     for (size_t s = 0; s < features_.segment_count(); ++s) {
+      WELLSPACE_RETURN_IF_ERROR(CheckAt(s));
       GraphSegment segment;
       for (const size_t end : {size_t{0}, size_t{1}}) {
         const uint32_t input = features_.ends[2 * s + end];
@@ -172,23 +200,22 @@ class GraphMaker {
     }
     std::vector<uint32_t> order(segments.size());
     std::iota(order.begin(), order.end(), 0);
-    std::sort(order.begin(), order.end(), [&](uint32_t i, uint32_t j) {
+    const auto is_before = [&](uint32_t i, uint32_t j) {
       const GraphSegment& s = segments[i];
       const GraphSegment& t = segments[j];
-      return std::tie(s.a, s.b, s.source) < std::tie(t.a, t.b, t.source);
-    });
+      return std::tie(s.a, s.b, s.source, i) < std::tie(t.a, t.b, t.source, j);
+    };
+    WELLSPACE_RETURN_IF_ERROR(CancellableSort(order, is_before, context_));
     std::vector<bool> is_dropped(segments.size());
     for (size_t k = 1; k < order.size(); ++k) {
+      WELLSPACE_RETURN_IF_ERROR(CheckAt(k));
       GraphSegment& first = segments[order[k - 1]];
       const GraphSegment& next = segments[order[k]];
       if (first.a != next.a || first.b != next.b) {
         continue;
       }
       if (first.marker != next.marker && !next.IsBoxSide()) {
-        return absl::InvalidArgumentError(absl::StrCat(
-            "markers: segments[", first.source, "] and segments[", next.source, "] lie on each other from ",
-            PlaceText(At(first.a)), " to ", PlaceText(At(first.b)), ", and have the markers ", first.marker, " and ",
-            next.marker, "; give both the same, or leave one out"));
+        return MarkersDifferError(graph_, first, next, first.a, first.b);
       }
       // A side of the box keeps the marker of a segment along it.
       graph_.counts.duplicate_segments += next.IsBoxSide() ? 0 : 1;
@@ -207,6 +234,14 @@ class GraphMaker {
     return absl::OkStatus();
   }
 
+  // What has been found in a part of the plane.
+  struct FaultsOfPart {
+    std::vector<Fault> faults;  // some of them twice, as two features may come together in more than one group
+    size_t unwanted = 0;
+    uint64_t compared_pairs = 0;
+    size_t next_look = kFaultsBetweenLooks;
+  };
+
   // Of all vertices that lie on segments or too close to them, and all segments that cross; ascending, each once. Stops
   // early where a part has more than an error tells of.
   absl::StatusOr<std::vector<Fault>> FindFaults() {
@@ -219,43 +254,149 @@ class GraphMaker {
     for (const GraphSegment& segment : graph_.segments) {
       ends.push_back({segment.a, segment.b});
     }
-    const SegmentPairs pairs(graph_.points, ends, least_separation_);
-    const std::vector<SegmentPairs::Group> parts = pairs.Parts(team_);
-    std::vector<std::vector<Fault>> found(parts.size());
+    const SegmentPairs pairs(graph_.points, ends, least_separation_, context_);
+    WELLSPACE_ASSIGN_OR_RETURN(const std::vector<SegmentPairs::Group> parts, pairs.Parts(team_));
+    std::vector<FaultsOfPart> found(parts.size());
+    are_too_many_ = false;
     team_.ForEach(parts.size(), [&](size_t part) {
-      size_t unwanted = 0;
       pairs.ForEachGroupOf(parts[part], [&](std::span<const uint32_t> segments, std::span<const uint32_t> points) {
-        const size_t first = found[part].size();
-        AppendFaults(segments, points, found[part]);
-        unwanted += std::count_if(found[part].begin() + static_cast<std::ptrdiff_t>(first), found[part].end(),
-                                  [this](const Fault& fault) { return !IsSplitAt(fault.kind); });
-        return unwanted <= kMostFaults && !context_.IsCancelled();
+        return AppendFaults(segments, points, found[part]) && found[part].unwanted <= kMostFaults && !IsStopped();
       });
+      LookAt(found[part]);
     });
     WELLSPACE_RETURN_IF_ERROR(context_.Check());
-    for (const std::vector<Fault>& of_part : found) {
-      faults.insert(faults.end(), of_part.begin(), of_part.end());
+    for (const FaultsOfPart& of_part : found) {
+      graph_.counts.compared_pairs += of_part.compared_pairs;
+      faults.insert(faults.end(), of_part.faults.begin(), of_part.faults.end());
     }
-    std::sort(faults.begin(), faults.end());
+    WELLSPACE_RETURN_IF_ERROR(CancellableSort(faults, std::less<Fault>(), context_));
     faults.erase(std::unique(faults.begin(), faults.end()), faults.end());
+    if (are_too_many_ || faults.size() > MostPairs()) {
+      return absl::ResourceExhaustedError(absl::StrCat(
+          "segments: there are more than ", MostPairs(),
+          " places where they cross or touch each other, or points lie on them, two by two; give fewer segments"));
+    }
     return faults;
   }
 
-  // Appends the faults among segments and points of a group.
-  void AppendFaults(std::span<const uint32_t> segments, std::span<const uint32_t> points,
-                    std::vector<Fault>& faults) const {
-    for (const uint32_t s : segments) {
-      for (const uint32_t p : points) {
-        if (const auto kind = PointFault(s, p)) {
-          faults.push_back({*kind, s, p});
-        }
-      }
-      for (const uint32_t t : segments) {
-        if (s < t && Cross(s, t)) {
-          faults.push_back({Fault::Kind::kCrossing, s, t});
-        }
+  // Tells needles from other points that are too close to a segment: they are closed, whatever the rule, since no double
+  // separates what is in them.
+  absl::Status FindNeedles(std::vector<Fault>& faults) {
+    const auto is_near = [](const Fault& fault) { return fault.kind == Fault::Kind::kNear; };
+    if (std::none_of(faults.begin(), faults.end(), is_near)) {
+      return absl::OkStatus();
+    }
+    std::vector<SegmentEnds> ends;
+    ends.reserve(graph_.segments.size());
+    for (const GraphSegment& segment : graph_.segments) {
+      ends.push_back({std::min(segment.a, segment.b), std::max(segment.a, segment.b)});
+    }
+    WELLSPACE_RETURN_IF_ERROR(CancellableSort(ends, std::less<SegmentEnds>(), context_));
+    const auto are_joined = [&](uint32_t p, uint32_t q) {
+      return std::binary_search(ends.begin(), ends.end(), SegmentEnds{std::min(p, q), std::max(p, q)});
+    };
+    for (Fault& fault : faults) {
+      const GraphSegment& segment = graph_.segments[fault.segment];
+      if (is_near(fault) && (are_joined(fault.other, segment.a) || are_joined(fault.other, segment.b))) {
+        fault.kind = Fault::Kind::kNeedle;
       }
     }
+    return absl::OkStatus();
+  }
+
+  size_t MostPairs() const { return std::max<size_t>(kMostPairs, max_vertices_); }
+  bool IsStopped() const { return are_too_many_.load(std::memory_order_relaxed) || context_.IsCancelled(); }
+
+  // Takes out equal faults, and notes if the others are too many.
+  void LookAt(FaultsOfPart& found) {
+    if (!CancellableSort(found.faults, std::less<Fault>(), context_).ok()) {
+      return;
+    }
+    found.faults.erase(std::unique(found.faults.begin(), found.faults.end()), found.faults.end());
+    found.next_look = std::max(kFaultsBetweenLooks, 2 * found.faults.size());
+    if (found.faults.size() > MostPairs()) {
+      are_too_many_ = true;
+    }
+  }
+
+  void Note(const Fault& fault, FaultsOfPart& found) {
+    found.faults.push_back(fault);
+    found.unwanted += IsSplitAt(fault.kind) ? 0 : 1;
+    if (found.faults.size() >= found.next_look) {
+      LookAt(found);
+    }
+  }
+
+  // Appends the faults among segments and points of a group, which may be large where features cannot be separated.
+  // Returns false if that was stopped.
+  bool AppendFaults(std::span<const uint32_t> segments, std::span<const uint32_t> points, FaultsOfPart& found) {
+    const bool is_large = segments.size() > kLargeGroup;
+    const auto goes_on = [&] { return !is_large || (found.unwanted <= kMostFaults && !IsStopped()); };
+    for (const uint32_t p : points) {
+      found.compared_pairs += segments.size();
+      for (const uint32_t s : segments) {
+        if (const auto kind = PointFault(s, p)) {
+          Note({*kind, s, p}, found);
+        }
+      }
+      if (!goes_on()) {
+        return false;
+      }
+    }
+    const auto compare = [&](uint32_t s, uint32_t t) {
+      ++found.compared_pairs;
+      if (Cross(s, t)) {
+        Note({Fault::Kind::kCrossing, std::min(s, t), std::max(s, t)}, found);
+      }
+    };
+    std::vector<uint32_t> rest(segments.begin(), segments.end());
+    while (rest.size() > kLargeGroup) {
+      // Segments with a common end do not cross: the others alone are compared with them.
+      const uint32_t apex = MostCommonEnd(rest);
+      const auto fan = std::partition(rest.begin(), rest.end(), [&](uint32_t s) {
+        return graph_.segments[s].a != apex && graph_.segments[s].b != apex;
+      });
+      if (static_cast<size_t>(rest.end() - fan) < kLargeGroup) {
+        break;
+      }
+      for (auto other = rest.begin(); other != fan; ++other) {
+        std::for_each(fan, rest.end(), [&](uint32_t s) { compare(*other, s); });
+        if (!goes_on()) {
+          return false;
+        }
+      }
+      rest.erase(fan, rest.end());
+    }
+    for (size_t i = 0; i < rest.size(); ++i) {
+      for (size_t j = i + 1; j < rest.size(); ++j) {
+        compare(rest[i], rest[j]);
+      }
+      if (!goes_on()) {
+        return false;
+      }
+    }
+    return true;
+  }
+
+  // The point in which most of `segments` have an end.
+  uint32_t MostCommonEnd(std::span<const uint32_t> segments) const {
+    std::vector<uint32_t> ends;
+    ends.reserve(2 * segments.size());
+    for (const uint32_t s : segments) {
+      ends.insert(ends.end(), {graph_.segments[s].a, graph_.segments[s].b});
+    }
+    std::sort(ends.begin(), ends.end());
+    uint32_t apex = ends.front();
+    std::ptrdiff_t most = 0;
+    for (auto end = ends.begin(); end != ends.end();) {
+      const auto next = std::upper_bound(end, ends.end(), *end);
+      if (next - end > most) {
+        most = next - end;
+        apex = *end;
+      }
+      end = next;
+    }
+    return apex;
   }
 
   std::optional<Fault::Kind> PointFault(uint32_t segment, uint32_t point) const {
@@ -292,6 +433,14 @@ class GraphMaker {
     return apart(one, two) && apart(two, one);
   }
 
+  // Where two segments cross. Those that are given do so in the first round: later ones have been bent over each other.
+  Point<2> CrossingOf(const Fault& fault) const {
+    const GraphSegment& s = graph_.segments[fault.segment];
+    const GraphSegment& t = graph_.segments[fault.other];
+    return std::pair(At(s.a), At(s.b)) < std::pair(At(t.a), At(t.b)) ? CrossingFrom(At(s.a), At(s.b), At(t.a), At(t.b))
+                                                                     : CrossingFrom(At(t.a), At(t.b), At(s.a), At(s.b));
+  }
+
   std::string NameOf(uint32_t segment) const {
     const GraphSegment& s = graph_.segments[segment];
     if (s.IsBoxSide()) {
@@ -307,9 +456,8 @@ class GraphMaker {
   std::string Describe(const Fault& fault) const {
     const GraphSegment& s = graph_.segments[fault.segment];
     if (fault.kind == Fault::Kind::kCrossing) {
-      const GraphSegment& t = graph_.segments[fault.other];
       return absl::StrCat(NameOf(fault.segment), " and ", NameOf(fault.other), " cross at ",
-                          PlaceText(CrossingOf(At(s.a), At(s.b), At(t.a), At(t.b))));
+                          PlaceText(CrossingOf(fault)));
     }
     const Point<2>& p = At(fault.other);
     return DescribeNearSegment(NameOfPoint(fault.other), p, DistanceToSegment(At(s.a), At(s.b), p),
@@ -365,7 +513,9 @@ class GraphMaker {
         const auto [begin, end] = by_cell_.equal_range({x, y});
         for (auto at = begin; at != end; ++at) {
           const double distance = Distance<2>(At(at->second), p);
-          if (distance < least_separation_ && (nearest == kNone || distance < Distance<2>(At(nearest), p))) {
+          if (distance < least_separation_ &&
+              (nearest == kNone ||
+               std::pair(distance, At(at->second)) < std::pair(Distance<2>(At(nearest), p), At(nearest)))) {
             nearest = at->second;
           }
         }
@@ -374,32 +524,47 @@ class GraphMaker {
     return nearest != kNone ? nearest : AddPoint(p);
   }
 
-  // Splits segments at what lies on them or crosses them.
-  void SplitAt(const std::vector<Fault>& faults) {
-    std::vector<std::pair<uint32_t, uint32_t>> splits;  // segment, point
-    for (const Fault& fault : faults) {
-      if (fault.kind != Fault::Kind::kCrossing) {
-        splits.emplace_back(fault.segment, fault.other);
-        ++(fault.kind == Fault::Kind::kOn ? graph_.counts.touching_vertices : graph_.counts.near_vertices);
+  // Splits segments at what lies on them or crosses them. Crossings are taken by their places, and so are points on a
+  // segment: their numbers are those of the input, whose order is not to matter.
+  absl::Status SplitAt(const std::vector<Fault>& faults) {
+    std::vector<std::pair<uint32_t, uint32_t>> splits;   // segment, point
+    std::vector<std::pair<Point<2>, size_t>> crossings;  // place, fault
+    for (size_t i = 0; i < faults.size(); ++i) {
+      WELLSPACE_RETURN_IF_ERROR(CheckAt(i));
+      if (faults[i].kind == Fault::Kind::kCrossing) {
+        crossings.emplace_back(CrossingOf(faults[i]), i);
         continue;
       }
-      const GraphSegment& s = graph_.segments[fault.segment];
-      const GraphSegment& t = graph_.segments[fault.other];
-      const uint32_t point = VertexNear(CrossingOf(At(s.a), At(s.b), At(t.a), At(t.b)));
+      splits.emplace_back(faults[i].segment, faults[i].other);
+      ++(faults[i].kind == Fault::Kind::kOn ? graph_.counts.touching_vertices : graph_.counts.near_vertices);
+    }
+    WELLSPACE_RETURN_IF_ERROR(CancellableSort(crossings, std::less<std::pair<Point<2>, size_t>>(), context_));
+    const size_t points_before = graph_.points.size();
+    for (size_t i = 0; i < crossings.size(); ++i) {
+      WELLSPACE_RETURN_IF_ERROR(CheckAt(i));
+      const uint32_t point = VertexNear(crossings[i].first);
+      const Fault& fault = faults[crossings[i].second];
       for (const uint32_t segment : {fault.segment, fault.other}) {
         splits.emplace_back(segment, point);
       }
       ++graph_.counts.crossings;
+      if (graph_.points.size() - points_before > max_vertices_) {
+        return absl::ResourceExhaustedError(
+            absl::StrCat("segments: ", crossings.size(), " pairs of them cross, which makes more than max_vertices = ",
+                         max_vertices_, " vertices; raise max_vertices, or give fewer segments"));
+      }
     }
-    std::sort(splits.begin(), splits.end(), [this](const auto& x, const auto& y) {
+    const auto is_before = [this](const auto& x, const auto& y) {
       const GraphSegment& s = graph_.segments[x.first];
       return x.first != y.first ? x.first < y.first
-                                : std::pair(Along(At(s.a), At(s.b), At(x.second)), x.second) <
-                                      std::pair(Along(At(s.a), At(s.b), At(y.second)), y.second);
-    });
+                                : std::pair(Along(At(s.a), At(s.b), At(x.second)), At(x.second)) <
+                                      std::pair(Along(At(s.a), At(s.b), At(y.second)), At(y.second));
+    };
+    WELLSPACE_RETURN_IF_ERROR(CancellableSort(splits, is_before, context_));
     std::vector<GraphSegment> split;
     auto next = splits.begin();
     for (uint32_t s = 0; s < graph_.segments.size(); ++s) {
+      WELLSPACE_RETURN_IF_ERROR(CheckAt(s));
       GraphSegment part = graph_.segments[s];
       const uint32_t end = part.b;
       for (; next != splits.end() && next->first == s; ++next) {
@@ -413,12 +578,15 @@ class GraphMaker {
       split.push_back(part);
     }
     graph_.segments = std::move(split);
+    return absl::OkStatus();
   }
 
   const Features& features_;
   const double least_separation_;
+  const uint64_t max_vertices_;
   const RunContext& context_;
   ThreadTeam team_;
+  std::atomic<bool> are_too_many_ = false;  // faults
   PlanarGraph graph_;
   std::multimap<Point<2>, uint32_t> by_cell_;  // points by cells as large as the least separation, of which so many:
   uint32_t in_cells_ = 0;
@@ -427,8 +595,9 @@ class GraphMaker {
 }  // namespace
 
 absl::StatusOr<PlanarGraph> MakePlanarGraph(std::span<const double> points, const Features& features, const Box<2>* box,
-                                            double least_separation, int threads, const RunContext& context) {
-  return GraphMaker(features, least_separation, threads, context).Make(points, box);
+                                            double least_separation, uint64_t max_vertices, int threads,
+                                            const RunContext& context) {
+  return GraphMaker(features, least_separation, max_vertices, threads, context).Make(points, box);
 }
 
 }  // namespace wellspace::core

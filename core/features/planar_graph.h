@@ -40,6 +40,7 @@ struct CleaningCounts {
   uint64_t touching_vertices = 0;   // that lay on a segment, which was split there
   uint64_t crossings = 0;           // of two segments, which were split there
   uint64_t near_vertices = 0;       // that lay too close to a segment, which was led through them
+  uint64_t compared_pairs = 0;      // of features, to find all these
 };
 
 // Invariants: (1) points are distinct; (2) two segments have at most one point in common, and then an end of both; (3)
@@ -71,16 +72,19 @@ struct PlanarGraph {
 // corners and sides belong to the graph, too.
 //
 // Guarantees: (1) where nothing crosses and nothing is too close, no coordinate is computed: a segment is split only at
-//             points that lie on it exactly.
-// Complexity: O((n + m) log (n + m)) for most inputs, and what is found.
+//             points that lie on it exactly; (2) neither the order of segments nor that of points, nor which end comes
+//             first, changes a place, or which segments there are.
+// Complexity: O((n + m) log (n + m)) for most inputs, and what is found. That is so, too, where all segments have a
+//             common end, lie side by side or on a common line.
 // Errors:     INVALID_ARGUMENT, naming segments, points and places: an end that does not exist; markers that differ on
 //             one segment; seeds whose polygons are not there, or not closed; and, unless they are to be split,
-//             segments that cross and vertices that are too close;
-//             RESOURCE_EXHAUSTED when splitting does not end; CANCELLED, DEADLINE_EXCEEDED.
+//             segments that cross and vertices that are too close; RESOURCE_EXHAUSTED when splitting does not end, or
+//             crossings make more than `max_vertices`; CANCELLED, DEADLINE_EXCEEDED.
 // Threads:    uses `threads`, at most as many as the machine has cores.
 // Source:     docs/design/features.md.
 absl::StatusOr<PlanarGraph> MakePlanarGraph(std::span<const double> points, const Features& features, const Box<2>* box,
-                                            double least_separation, int threads, const RunContext& context);
+                                            double least_separation, uint64_t max_vertices, int threads,
+                                            const RunContext& context);
 
 }  // namespace wellspace::core
 

@@ -2,19 +2,19 @@
 #ifndef WELLSPACE_CORE_FEATURES_SEGMENT_PAIRS_H_
 #define WELLSPACE_CORE_FEATURES_SEGMENT_PAIRS_H_
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <iterator>
+#include <optional>
 #include <span>
-#include <utility>
 #include <vector>
 
+#include "absl/functional/function_ref.h"
+#include "absl/status/statusor.h"
+#include "core/base/run_context.h"
 #include "core/base/thread_team.h"
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
-#include "core/geometry/segment.h"
 
 namespace wellspace::core {
 
@@ -24,12 +24,20 @@ using SegmentEnds = std::array<uint32_t, 2>;
 // Calls compare(segments, points) for groups of features, so that every two of which one is a segment, and which come
 // within `reach` of each other, are together in some group. Two segments with a common end may be in none.
 //
+// A square of the quadtree is quartered until it holds few features, or segments with a common end alone. One that many
+// segments pass through, side by side, would be quartered until it is narrower than what is between two of them. It is
+// halved along one of them instead, which the others do not cross.
+//
 // Thread safety: thread-compatible; const functions may run at once.
 class SegmentPairs {
  public:
-  // REQUIRES:   all spans outlive this; reach >= 0.
-  SegmentPairs(std::span<const Point<2>> points, std::span<const SegmentEnds> segments, double reach)
-      : points_(points), segments_(segments), reach_(reach) {}
+  // Returns false to stop.
+  using Compare = absl::FunctionRef<bool(std::span<const uint32_t> segments, std::span<const uint32_t> points)>;
+
+  // REQUIRES:   all that is given outlives this; reach >= 0.
+  SegmentPairs(std::span<const Point<2>> points, std::span<const SegmentEnds> segments, double reach,
+               const RunContext& context)
+      : points_(points), segments_(segments), reach_(reach), context_(context) {}
 
   // Features in a square of the quadtree.
   struct Group {
@@ -42,100 +50,47 @@ class SegmentPairs {
   // Parts that threads may look at at once: together, their groups are all.
   //
   // Complexity: O(n + m) for most inputs.
-  std::vector<Group> Parts(ThreadTeam& team) const {
-    std::vector<Group> parts(1);
-    Group& all = parts.front();
-    all.box = {{points_[0]}, {points_[0]}};
-    for (uint32_t i = 0; i < points_.size(); ++i) {
-      all.points.push_back(i);
-      all.box.Include({points_[i], points_[i]});
-    }
-    for (uint32_t i = 0; i < segments_.size(); ++i) {
-      all.segments.push_back(i);
-    }
-    // A square, so that the children are.
-    const double side = all.box.LongestSide();
-    for (int axis = 0; axis < 2; ++axis) {
-      all.box.high[axis] = all.box.low[axis] + side;
-    }
-    for (int depth = 0; depth < kDepthOfParts; ++depth) {
-      std::vector<Group> next(4 * parts.size());
-      team.ForEach(next.size(), [&](size_t i) {
-        if (!IsCompared(parts[i / 4])) {
-          next[i] = QuarterOf(parts[i / 4], static_cast<int>(i % 4));
-        } else if (i % 4 == 0) {
-          next[i] = parts[i / 4];
-        }
-      });
-      std::erase_if(next, [](const Group& group) { return group.segments.empty(); });
-      parts = std::move(next);
-    }
-    return parts;
-  }
+  // Errors:     CANCELLED, DEADLINE_EXCEEDED.
+  absl::StatusOr<std::vector<Group>> Parts(ThreadTeam& team) const;
 
-  // Calls `compare` for the groups of a part. Stops when it returns false.
+  // Calls `compare` for the groups of a part. Stops when it returns false, or the run is cancelled.
   //
   // Complexity: O((n + m) log) for all parts of most inputs.
-  template <typename Compare>
-  bool ForEachGroupOf(const Group& part, const Compare& compare) const {
-    if (part.segments.empty()) {
-      return true;
-    }
-    if (IsCompared(part)) {
-      return compare(std::span<const uint32_t>(part.segments), std::span<const uint32_t>(part.points));
-    }
-    for (int quarter = 0; quarter < 4; ++quarter) {
-      if (!ForEachGroupOf(QuarterOf(part, quarter), compare)) {
-        return false;
-      }
-    }
-    return true;
-  }
+  bool ForEachGroupOf(const Group& part, Compare compare) const;
 
  private:
-  static constexpr size_t kComparedTogether = 16;
-  static constexpr int kMostDepth = 50;
-  static constexpr int kDepthOfParts = 3;
+  // A stretch of a segment, from one share of its length to another.
+  struct Stretch {
+    uint32_t segment = 0;
+    double from = 0;
+    double to = 1;
+  };
+  // Features on one side of some lines.
+  struct Slice {
+    std::vector<Stretch> stretches;
+    std::vector<uint32_t> points;
+    int depth = 0;
+  };
+  // A line: its points x have Dot(normal, x) = offset. The normal has length 1.
+  struct Line {
+    Point<2> normal{};
+    double offset = 0;
+  };
 
-  // Whether a group is small enough, or smaller ones would not do.
-  bool IsCompared(const Group& group) const {
-    return group.segments.size() + group.points.size() <= kComparedTogether || group.depth == kMostDepth ||
-           (group.points.size() <= 2 && HaveACommonEnd(group.segments));
-  }
+  bool IsCompared(const Group& group) const;
+  Group QuarterOf(const Group& group, int quarter) const;
+  bool HaveACommonEnd(std::span<const uint32_t> group) const;
 
-  Group QuarterOf(const Group& group, int quarter) const {
-    Group child;
-    child.box = group.box;
-    child.depth = group.depth + 1;
-    for (int axis = 0; axis < 2; ++axis) {
-      const double middle = 0.5 * (group.box.low[axis] + group.box.high[axis]);
-      (((quarter >> axis) & 1) != 0 ? child.box.low : child.box.high)[axis] = middle;
-    }
-    const double room = reach_ + 0x1p-45 * (std::abs(child.box.low[0]) + std::abs(child.box.high[0]) +
-                                            std::abs(child.box.low[1]) + std::abs(child.box.high[1]));
-    Box<2> wide = child.box;
-    for (int axis = 0; axis < 2; ++axis) {
-      wide.low[axis] -= room;
-      wide.high[axis] += room;
-    }
-    std::copy_if(group.points.begin(), group.points.end(), std::back_inserter(child.points),
-                 [&](uint32_t p) { return wide.Contains(points_[p]); });
-    std::copy_if(group.segments.begin(), group.segments.end(), std::back_inserter(child.segments),
-                 [&](uint32_t s) { return !SurelyMisses(points_[segments_[s][0]], points_[segments_[s][1]], wide); });
-    return child;
-  }
-
-  bool HaveACommonEnd(std::span<const uint32_t> group) const {
-    const auto all_have = [&](uint32_t p) {
-      return std::all_of(group.begin(), group.end(),
-                         [&](uint32_t s) { return segments_[s][0] == p || segments_[s][1] == p; });
-    };
-    return all_have(segments_[group[0]][0]) || all_have(segments_[group[0]][1]);
-  }
+  bool ForEachGroupOf(Slice slice, Compare compare) const;
+  Point<2> PlaceOn(uint32_t segment, double share) const;
+  Line LineAlong(const Slice& slice) const;
+  std::optional<Line> LineAcross(const Slice& slice) const;
+  Slice SideOf(const Slice& slice, const Line& line, double sign) const;
 
   const std::span<const Point<2>> points_;
   const std::span<const SegmentEnds> segments_;
   const double reach_;
+  const RunContext& context_;
 };
 
 }  // namespace wellspace::core

@@ -59,7 +59,7 @@ struct Drawing {
     features.is_open = is_open;
     features.crossings = CrossingRule::kSplit;
     features.seeds = seeds;
-    absl::StatusOr<PlanarGraph> made = MakePlanarGraph(points, features, nullptr, 1e-12, 1, RunContext());
+    absl::StatusOr<PlanarGraph> made = MakePlanarGraph(points, features, nullptr, 1e-12, 1'000'000, 1, RunContext());
     if (!made.ok()) {
       return made.status();
     }
