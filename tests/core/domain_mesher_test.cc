@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <numbers>
@@ -17,6 +18,7 @@
 #include "core/mesher.h"
 #include "core/simplex/quality.h"
 #include "tests/core/domain_input.h"
+#include "tests/support/canonical.h"
 #include "tests/support/seeded_test.h"
 
 namespace wellspace::core {
@@ -177,6 +179,60 @@ TEST(DomainMesherTest, SmallAnglesEndAndKeepTheBound) {
   }
 }
 
+// Two segments with a common end, so close to each other that a vertex on one and its foot on the other round to the
+// same distance from that end.
+TEST(DomainMesherTest, NeedlesThatDoublesHardlySeparateAreMeshed) {
+  int meshed = 0;
+  for (const double offset : {0.0, 1.0, 78.0, 1e4, 5e5}) {
+    for (int gap_exponent = 2; gap_exponent <= 8; ++gap_exponent) {
+      for (const double longer : {1.0, 1.001, 1.3}) {
+        const double gap = std::pow(10, -gap_exponent);
+        const double turn = 0.7 * gap_exponent + longer;
+        const auto at = [&](double along, double across) -> Point<2> {
+          return {offset + along * std::cos(turn) - across * std::sin(turn),
+                  0.6 * offset + along * std::sin(turn) + across * std::cos(turn)};
+        };
+        if (offset * 0x1p-45 > gap && longer == 1) {
+          continue;  // the far ends are too close to each other to be two points
+        }
+        Input input;
+        input.faces = FaceRule::kBox;
+        input.Segment(at(0, 0), at(1, 0)).Segment(at(0, 0), at(longer, longer * gap));
+        const auto mesh = input.Make();
+        ASSERT_TRUE(mesh.ok()) << offset << " " << gap << " " << longer << ": " << mesh.status();
+        ExpectPointsKept(input.points, *mesh);
+        EXPECT_LT(mesh->vertex_count(), 400u) << offset << " " << gap << " " << longer;
+        ExpectConforming(*mesh);
+        ++meshed;
+      }
+    }
+  }
+  EXPECT_EQ(meshed, 104);
+}
+
+// As they are in maps: places in degrees with six decimals, and two borders that are digitized one after the other.
+TEST(DomainMesherTest, NeedlesOfMapsAreMeshed) {
+  Input needle;
+  needle.faces = FaceRule::kBox;
+  needle.Segment({-71.501186, 42.041924}, {-71.500424, 42.041923})
+      .Segment({-71.500424, 42.041923}, {-71.501185, 42.041924});
+  Input wards;
+  wards.faces = FaceRule::kEvenOdd;
+  wards.crossings = CrossingRule::kSplit;
+  wards.Ring({{-71.501186, 42.041924}, {-71.500424, 42.041923}, {-71.500408, 42.042098}})
+      .Ring({{-71.500424, 42.041923}, {-71.501185, 42.041924}, {-71.501185, 42.042055}});
+  for (Input* input : {&needle, &wards}) {
+    for (const double rho : {0.0, 1.0, 3.0}) {
+      input->parameters.rho = rho;
+      const auto mesh = input->Make();
+      ASSERT_TRUE(mesh.ok()) << rho << ": " << mesh.status();
+      ExpectPointsKept(input->points, *mesh);
+      ExpectConforming(*mesh);
+      EXPECT_GT(mesh->statistics.domain->exempt_simplices, 0u) << "those in the needle";
+    }
+  }
+}
+
 // What is rounded is not little beside these: their centres are off by 1e-8 of their lengths.
 TEST(DomainMesherTest, VeryShortSegmentsAreNotSplitByWhatIsRounded) {
   for (int turn = 0; turn < 40; ++turn) {
@@ -275,6 +331,35 @@ TEST_F(DomainMesherPropertyTest, RandomSegmentsOnASmallGridAreMeshed) {
     EXPECT_NEAR(AreaOf(*mesh), 100, 1e-10);
     if (mesh->vertex_count() < 1000) {
       ExpectConforming(*mesh);
+    }
+  }
+}
+
+TEST_F(DomainMesherPropertyTest, SegmentsThatCrossMakeTheSameMeshInAnyOrder) {
+  for (int run = 0; run < 12; ++run) {
+    Input input;
+    input.faces = FaceRule::kBox;
+    input.crossings = CrossingRule::kSplit;
+    const size_t count = 3 + random_.Below(6);
+    for (size_t i = 0; i < count; ++i) {
+      input.Segment({random_.Unit(), random_.Unit()}, {random_.Unit(), random_.Unit()});
+    }
+    const auto mesh = input.Make();
+    ASSERT_TRUE(mesh.ok()) << run << ": " << mesh.status();
+    for (int other = 0; other < 3; ++other) {
+      Input shuffled = input;
+      for (size_t i = count; i-- > 0;) {
+        const size_t from = random_.Below(i + 1);
+        std::swap(shuffled.ends[2 * i], shuffled.ends[2 * from]);
+        std::swap(shuffled.ends[2 * i + 1], shuffled.ends[2 * from + 1]);
+        if (random_.Below(2) == 1) {
+          std::swap(shuffled.ends[2 * i], shuffled.ends[2 * i + 1]);
+        }
+      }
+      shuffled.parameters.threads = 1 + other % 2;
+      const auto same = shuffled.Make();
+      ASSERT_TRUE(same.ok()) << run << ": " << same.status();
+      EXPECT_EQ(test::Canonical(*same), test::Canonical(*mesh)) << run;
     }
   }
 }

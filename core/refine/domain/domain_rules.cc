@@ -144,7 +144,7 @@ DomainRules::Bound DomainRules::BoundOf(const Polytope<2>& cell, const CellNode<
 }
 
 DomainAssessment DomainRules::AssessCell(VertexId v, Polytope<2>& cell, std::span<const uint32_t> segments,
-                                         double edge_limit_sq, std::span<const NodeName> refused) const {
+                                         double edge_limit_sq, const PassedOver& passed_over) const {
   DomainAssessment result;
   const bool keeps_ratio = cell.KeepsRatio(plain_ratio_);
   if (keeps_ratio && !MayMeetAny(domain(), v, cell, segments)) {
@@ -152,7 +152,7 @@ DomainAssessment DomainRules::AssessCell(VertexId v, Polytope<2>& cell, std::spa
     return result;
   }
   cell.Place();
-  result.met = NearestMet(domain(), v, cell, segments);
+  result.met = NearestMet(domain(), v, cell, segments, passed_over.segments);
   result.is_segment_encroached = result.met.IsThere();
   if (keeps_ratio) {
     return result;  // no node is on the clip, or bad
@@ -181,7 +181,7 @@ DomainAssessment DomainRules::AssessCell(VertexId v, Polytope<2>& cell, std::spa
       continue;
     }
     const NodeName name = view.Name();
-    if (std::find(refused.begin(), refused.end(), name) != refused.end()) {
+    if (std::find(passed_over.nodes.begin(), passed_over.nodes.end(), name) != passed_over.nodes.end()) {
       continue;
     }
     const std::tuple<double, NodeName, Point<2>> own = {node.radius_sq, name, node.x};
@@ -274,6 +274,12 @@ DomainRules::Answer DomainRules::NextRequest(VertexId v, const Polytope<2>& cell
   Answer answer;
   if (found.met.IsThere()) {  // rule 1
     answer.request = RequestAt(v, SplitPlace(visible_, v, found.met), edge_limit_sq, workspace);
+    if (!rules_.IsLongEnough(answer.request->point)) {
+      // Two vertices at one distance from the end of a tiny angle: either is in the disc of the other's segment by what
+      // is rounded. MakeConforming has the last word.
+      answer.request.reset();
+      answer.passed_segment = found.met.segment;
+    }
     return answer;
   }
   if (found.bad_node < 0) {  // rule 3
@@ -292,9 +298,13 @@ DomainRules::Answer DomainRules::NextRequest(VertexId v, const Polytope<2>& cell
     const bool is_small = domain().HasSmallAngle(HalfEdgeOf(place.segment, false)) ||
                           domain().HasSmallAngle(HalfEdgeOf(place.segment, true));
     if (is_small && rho_sq < kSafeRhoSq && !found.is_too_large && rest_sq < found.bound_sq / rho_sq) {
-      answer.refused = view.Name();
-    } else {
-      answer.request = RequestAt(v, RoundPlace(visible_, place, std::sqrt(rest_sq)), edge_limit_sq, workspace);
+      answer.refused_node = view.Name();
+      return answer;
+    }
+    answer.request = RequestAt(v, RoundPlace(visible_, place, std::sqrt(rest_sq)), edge_limit_sq, workspace);
+    if (is_small && !found.is_too_large && !rules_.IsLongEnough(answer.request->point)) {
+      answer.request.reset();
+      answer.refused_node = view.Name();
     }
     return answer;
   }

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "core/base/ids.h"
 #include "core/cell/polytope.h"
@@ -29,12 +30,20 @@ struct DomainAssessment : Assessment {
   MetPart met;  // there if is_segment_encroached
 };
 
+// What a cell has asked for in vain: no place for a vertex was far enough from others. It asks no more for it.
+struct PassedOver {
+  std::vector<NodeName> nodes;
+  std::vector<uint32_t> segments;  // that it meets
+};
+
 // A cell asks for one insertion at a time. The first of these that applies decides:
-//   1. It meets a segment that its site is not on: the nearest one is split (NearestMet, SplitPlace).
+//   1. It meets a segment that its site is not on: the nearest one is split (NearestMet, SplitPlace); or passed over,
+//      where no double separates the new vertex from one that is there.
 //   2. A node breaks a bound, of rho, of a size or of an area: a point in its sector (CandidateIn), or, if that is too
 //      near to a segment or beyond one, its foot there (YieldPlace, RoundPlace). Where the foot would come too near at
-//      a small angle, the node is refused, and the cell looked at again without it.
+//      a small angle, the node is refused.
 //   3. Nothing: the vertex is done, or looked at later.
+// What is refused or passed over is left out when the cell is looked at again.
 // These nodes do not count: one in a face that is not meshed; one between whose generators an own segment lies
 // (IsCrossed), which is only remembered; by rho, one whose triangle is across (IsAcross); one that was refused.
 //
@@ -61,21 +70,22 @@ class DomainRules {
   double NearestSegmentSq(VertexId v, double limit_sq, Workspace<2>& workspace) const;
 
   // What is wrong with the cell of `v`, whose nodes are placed unless it is plainly good; `segments` has all that meet
-  // it. What a cell is beyond the segments of v, on sides that are not meshed, does not count. Nodes in `refused` ask
-  // for nothing.
+  // it. What a cell is beyond the segments of v, on sides that are not meshed, does not count. What is in `passed_over`
+  // asks for nothing.
   //
   // Complexity: O(nodes segments).
   DomainAssessment AssessCell(VertexId v, Polytope<2>& cell, std::span<const uint32_t> segments, double edge_limit_sq,
-                              std::span<const NodeName> refused) const;
+                              const PassedOver& passed_over) const;
 
-  // The insertion that `cell`, that of `v`, asks for by what was found; or the node that is refused, after which the
-  // cell has to be assessed again; none of both if nothing is asked for. `segments` as in AssessCell; cell_of computes
-  // cells in `workspace`.
+  // The insertion that `cell`, that of `v`, asks for by what was found; or the node or segment that is to be passed
+  // over, after which the cell has to be assessed again; none of these if nothing is asked for. `segments` as in
+  // AssessCell; cell_of computes cells in `workspace`.
   //
   // Complexity: O(nodes), a few queries, and the cell of cell_of.
   struct Answer {
     std::optional<InsertionRequest<2>> request;
-    std::optional<NodeName> refused;
+    std::optional<NodeName> refused_node;
+    std::optional<uint32_t> passed_segment;
   };
   Answer NextRequest(VertexId v, const Polytope<2>& cell, std::span<const uint32_t> segments,
                      const DomainAssessment& found, double edge_limit_sq, StepRules<2>::CellOf cell_of,

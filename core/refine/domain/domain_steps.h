@@ -23,8 +23,8 @@
 namespace wellspace::core {
 
 // As CellSteps, whose functions it has; segments take the place of faces of the box. Two things differ:
-// - A node may be refused by the rules. Then the cell is assessed again, without it, before the next request is looked
-//   for; what was found before no longer holds (Reassessed).
+// - A node or a segment may be passed over by the rules. Then the cell is assessed again, without it, before the next
+//   request is looked for; what was found before no longer holds (Reassessed).
 // - All neighbours get a notice, and no nodes are watched.
 //
 // Thread safety: as CellSteps.
@@ -44,7 +44,7 @@ class DomainSteps {
     if (cell().IsTooLarge()) {
       return nullptr;
     }
-    found_ = rules_.AssessCell(v_, cell(), workspace_.own.segments, edge_limit_sq_, refused_);
+    found_ = rules_.AssessCell(v_, cell(), workspace_.own.segments, edge_limit_sq_, passed_over_);
     return &found_;
   }
 
@@ -71,10 +71,13 @@ class DomainSteps {
       DomainRules::Answer answer =
           rules_.NextRequest(v_, cell(), workspace_.own.segments, found_, edge_limit_sq_, cell_of, workspace_.other);
       request_ = answer.request;
-      if (!answer.refused.has_value()) {
+      if (answer.refused_node.has_value()) {
+        passed_over_.nodes.push_back(*answer.refused_node);
+      } else if (answer.passed_segment.has_value()) {
+        passed_over_.segments.push_back(*answer.passed_segment);
+      } else {
         return request_.has_value() ? &*request_ : nullptr;
       }
-      refused_.push_back(*answer.refused);
       Assess();
       is_reassessed_ = true;
     }
@@ -105,8 +108,8 @@ class DomainSteps {
   const VertexId v_;
   const double edge_limit_sq_;
   DomainAssessment found_;
-  std::vector<NodeName> refused_;  // in all steps of the vertex
-  bool is_reassessed_ = false;     // while the last request was looked for
+  PassedOver passed_over_;      // in all steps of the vertex
+  bool is_reassessed_ = false;  // while the last request was looked for
   std::optional<InsertionRequest<2>> request_;
 };
 

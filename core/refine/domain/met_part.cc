@@ -112,11 +112,12 @@ bool MayMeetAny(const PlanarDomain& domain, VertexId v, const Polytope<2>& cell,
   });
 }
 
-MetPart NearestMet(const PlanarDomain& domain, VertexId v, const Polytope<2>& cell,
-                   std::span<const uint32_t> segments) {
+MetPart NearestMet(const PlanarDomain& domain, VertexId v, const Polytope<2>& cell, std::span<const uint32_t> segments,
+                   std::span<const uint32_t> passed_over) {
   MetPart nearest;
   for (const uint32_t segment : segments) {
-    if (segment == nearest.segment || domain.IsOn(v, segment)) {
+    if (segment == nearest.segment || domain.IsOn(v, segment) ||
+        std::find(passed_over.begin(), passed_over.end(), segment) != passed_over.end()) {
       continue;
     }
     const MetPart part = MeetSegment(domain, cell, segment);

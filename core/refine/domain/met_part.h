@@ -29,11 +29,13 @@ struct MetPart {
 bool MayMeetAny(const PlanarDomain& domain, VertexId v, const Polytope<2>& cell, std::span<const uint32_t> segments);
 
 // The part of the nearest of `segments` that `cell`, that of `v`, meets though v is not on it; of those that are as
-// near the one of the lowest number. A part that is no longer than what is rounded does not count.
+// near the one of the lowest number. A part that is no longer than what is rounded does not count, nor do segments that
+// are `passed_over`.
 //
 // REQUIRES:   the nodes of the cell are placed.
 // Complexity: O(nodes segments).
-MetPart NearestMet(const PlanarDomain& domain, VertexId v, const Polytope<2>& cell, std::span<const uint32_t> segments);
+MetPart NearestMet(const PlanarDomain& domain, VertexId v, const Polytope<2>& cell, std::span<const uint32_t> segments,
+                   std::span<const uint32_t> passed_over);
 
 }  // namespace wellspace::core
 

@@ -21,9 +21,9 @@ class Looks {
   explicit Looks(const test::SmallDomain& domain, double rho = std::sqrt(2.0))
       : domain_(domain), step_rules_(domain.structure, {.rho = rho}, 1e-9) {}
 
-  DomainAssessment Assess(VertexId v, double limit_sq = kLimitSq, const std::vector<NodeName>& refused = {}) {
+  DomainAssessment Assess(VertexId v, double limit_sq = kLimitSq, const PassedOver& passed_over = {}) {
     domain_.structure.UnplacedClippedVoronoi(v, step_rules_.ClipAround(v, limit_sq), workspace_);
-    return rules_.AssessCell(v, workspace_.cell, workspace_.segments, limit_sq, refused);
+    return rules_.AssessCell(v, workspace_.cell, workspace_.segments, limit_sq, passed_over);
   }
   DomainRules::Answer Next(VertexId v, const DomainAssessment& found) {
     const auto cell_of = [this](VertexId u, const Box<2>& clip) {
@@ -97,7 +97,7 @@ TEST(DomainRulesTest, ABadNodeAsksInItsFace) {
   EXPECT_FALSE(answer.request->place.on.IsOnSegment());
   EXPECT_TRUE(domain.planar->faces().IsMeshed(answer.request->place.face));
 
-  const DomainAssessment without = looks.Assess(v, kLimitSq, {looks.NameOf(found.bad_node)});
+  const DomainAssessment without = looks.Assess(v, kLimitSq, {.nodes = {looks.NameOf(found.bad_node)}, .segments = {}});
   EXPECT_NE(without.bad_node, found.bad_node) << "a node that is refused asks for nothing";
   const DomainAssessment later = looks.Assess(v, 0.01);
   EXPECT_LT(later.bad_node, 0) << "the bucket is below its edge";
@@ -111,11 +111,11 @@ class SmallAngleTest : public ::testing::Test {
   bool IsBadAtApex(VertexId v, VertexId u) const {
     Looks looks(domain_);
     const NodeName at_apex = std::minmax(u, domain_.At(kApex));
-    std::vector<NodeName> refused;
+    PassedOver refused;
     for (DomainAssessment found = looks.Assess(v); found.bad_node >= 0; found = looks.Assess(v, kLimitSq, refused)) {
-      refused.push_back(looks.NameOf(found.bad_node));
+      refused.nodes.push_back(looks.NameOf(found.bad_node));
     }
-    return std::find(refused.begin(), refused.end(), at_apex) != refused.end();
+    return std::find(refused.nodes.begin(), refused.nodes.end(), at_apex) != refused.nodes.end();
   }
 
   static constexpr Point<2> kApex = {0, 0};
