@@ -192,7 +192,8 @@ class OverlapFinder {
       if (i > 0 && ends[i].point != ends[i - 1].point) {
         ++places;
         if (!open.empty()) {
-          WELLSPACE_RETURN_IF_ERROR(AddPart({ends[i - 1].point, ends[i].point}, open, open_by_marker, open_rings, open_polygons));
+          WELLSPACE_RETURN_IF_ERROR(
+              AddPart({ends[i - 1].point, ends[i].point}, open, open_by_marker, open_rings, open_polygons));
         }
       }
       const uint32_t s = ends[i].segment;

@@ -279,8 +279,8 @@ class GraphMaker {
     return faults;
   }
 
-  // Tells needles from other points that are too close to a segment: they are closed, whatever the rule, since no double
-  // separates what is in them.
+  // Tells needles from other points that are too close to a segment: they are closed, whatever the rule, since no
+  // double separates what is in them.
   absl::Status FindNeedles(std::vector<Fault>& faults) {
     const auto is_near = [](const Fault& fault) { return fault.kind == Fault::Kind::kNear; };
     if (std::none_of(faults.begin(), faults.end(), is_near)) {

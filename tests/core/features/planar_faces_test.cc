@@ -351,7 +351,8 @@ TEST_F(PlanarFacesPropertyTest, APolygonHasWhatARayCountsInItsOwnRings) {
         Features features;
         features.ends = alone[p].ends;
         features.crossings = CrossingRule::kSplit;
-        const PlanarGraph graph = *MakePlanarGraph(alone[p].points, features, nullptr, 1e-12, 1, RunContext());
+        const PlanarGraph graph =
+            *MakePlanarGraph(alone[p].points, features, nullptr, 1e-12, 1'000'000, 1, RunContext());
         if (CrossingsLeftOf(graph, place) % 2 == 1) {
           around.push_back(p);
         }
