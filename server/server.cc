@@ -98,6 +98,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& optio
   if (session_log == nullptr) {
     session_log = std::make_unique<EphemeralLog>();
   }
+  const bool keeps_files = session_log->is_durable();
   std::unique_ptr<Server> server(new Server(options, std::move(security), std::move(log), std::move(session_log),
                                             std::move(mesher), std::move(estimator), std::move(create_mesher)));
   WELLSPACE_RETURN_IF_ERROR(server->backend_.Restore());
@@ -118,7 +119,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& optio
   if (listener != nullptr) {
     server->address_ = address.ToString();
     server->listener_ = std::move(listener);
-    server->listener_->Start(std::move(acceptor), server->connections_);
+    server->listener_->Start(std::move(acceptor), server->connections_, keeps_files);
   }
   return server;
 }
@@ -126,6 +127,12 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& optio
 Server::~Server() {
   Shutdown(absl::ZeroDuration());
   observability_.Stop();
+}
+
+ConnectionLimits Server::LimitsOf(const ServerOptions& options) {
+  ConnectionLimits limits = options.connections.calls;
+  limits.max_received = MostReceived(options.service);
+  return limits;
 }
 
 std::vector<std::string> Server::ServiceNames() {

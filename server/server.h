@@ -85,11 +85,13 @@ class Server {
   Server(const ServerOptions& options, std::unique_ptr<Security> security, std::shared_ptr<spdlog::logger> log,
          std::unique_ptr<SessionLog> session_log, Mesher mesher, Estimator estimator, MesherFactory create_mesher)
       : security_(std::move(security)),
-        connections_(options.connections.calls, log),
+        connections_(LimitsOf(options), log),
         observability_(ServiceNames(), log, connections_,
                        [this](const grpc::ServerContextBase& context) { return TenantOf(context); }),
         backend_(options.service, security_->authenticator(), observability_, std::move(log), std::move(session_log),
                  std::move(mesher), std::move(estimator), std::move(create_mesher)) {}
+
+  static ConnectionLimits LimitsOf(const ServerOptions& options);
 
   // Of the services that are ours.
   static std::vector<std::string> ServiceNames();

@@ -10,6 +10,7 @@
 #include <sys/socket.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstring>
 #include <utility>
 #include <vector>
@@ -23,6 +24,7 @@ namespace {
 
 constexpr size_t kAddressBytes = sizeof(in6_addr);
 constexpr size_t kMaxHosts = 10'000;
+constexpr std::string_view kUnclaimed = "it sends what belongs to no call";
 
 std::string KeyOf(const in6_addr& address, uint16_t port) {
   std::string key(reinterpret_cast<const char*>(&address), kAddressBytes);
@@ -62,6 +64,12 @@ std::string HostOf(const std::string& key) {
   return key.substr(0, IN6_IS_ADDR_V4MAPPED(&address) ? kAddressBytes : kNetworkBytes);
 }
 
+// The peer hears of the end by a reset, whatever it is still sending.
+void ResetWhenClosed(int socket) {
+  const linger reset = {.l_onoff = 1, .l_linger = 0};
+  setsockopt(socket, SOL_SOCKET, SO_LINGER, &reset, sizeof(reset));
+}
+
 // Throws away what has come on a shut socket and was not read.
 void Discard(int socket) {
   constexpr size_t kPiece = size_t{1} << 20;
@@ -74,9 +82,18 @@ void Discard(int socket) {
   // A peer who found the window closed would wait a minute for it to open. As for bytes that stay unread, Linux shall
   // send a reset when the socket is closed.
   if (!is_empty) {
-    const linger reset = {.l_onoff = 1, .l_linger = 0};
-    setsockopt(socket, SOL_SOCKET, SO_LINGER, &reset, sizeof(reset));
+    ResetWhenClosed(socket);
   }
+}
+
+// What TCP knows of a socket; all 0 where it is none of TCP.
+tcp_info TcpInfoOf(int socket) {
+  tcp_info info = {};
+  socklen_t size = sizeof(info);
+  if (getsockopt(socket, IPPROTO_TCP, TCP_INFO, &info, &size) != 0) {
+    return {};
+  }
+  return info;
 }
 
 // What the peer has not taken yet, and what it has, in bytes.
@@ -87,13 +104,19 @@ struct Output {
 
 Output OutputOf(int socket) {
   int waiting = 0;
-  tcp_info info = {};
-  socklen_t size = sizeof(info);
-  if (ioctl(socket, SIOCOUTQ, &waiting) != 0 || getsockopt(socket, IPPROTO_TCP, TCP_INFO, &info, &size) != 0) {
+  if (ioctl(socket, SIOCOUTQ, &waiting) != 0) {
     return {};
   }
-  return {.waiting = static_cast<uint64_t>(waiting), .taken = info.tcpi_bytes_acked};
+  return {.waiting = static_cast<uint64_t>(waiting), .taken = TcpInfoOf(socket).tcpi_bytes_acked};
 }
+
+// What comes with what is sent: updates of windows, which other stacks send for every frame, and pings.
+constexpr uint64_t kSentBytesPerClaimed = 16;
+// What comes with time: pings of both sides, and their answers. So little that whoever holds back the end of headers
+// fills no memory.
+constexpr int64_t kClaimedPerSecond = 64;
+// What each connection begins with: a handshake with certificates, settings.
+constexpr int64_t kOfABeginning = 8 << 10;
 
 }  // namespace
 
@@ -114,6 +137,23 @@ class Connections::Connection {
   // When something last did not wait, or was taken.
   Clock::time_point read_last = Clock::now();
   uint64_t taken = 0;
+
+  // Bytes that calls have claimed since the last look. Not guarded: every message counts here.
+  std::atomic<uint64_t> claimed = 0;
+  std::atomic<uint64_t> of_messages = 0;  // of callers whom the server knows, ever
+  int known_calls = 0;                    // of callers whom the server knows
+  int known_calls_lately = 0;             // the most, since known_since
+  Clock::time_point known_since = Clock::now();
+  // As of the last look.
+  Clock::time_point looked = Clock::now();
+  uint64_t received = 0;
+  uint64_t acknowledged = 0;
+  int64_t unclaimed = 0;
+  int64_t excess = 0;  // of these, what no call can have under way
+  int64_t excess_before = 0;
+  // What may have been under way of calls that ended, until a while after the last of these ends.
+  Clock::time_point last_end = Clock::now();
+  int64_t of_ended = 0;
 };
 
 struct Connections::Host {
@@ -125,6 +165,13 @@ Connections::Connections(const ConnectionLimits& limits, std::shared_ptr<spdlog:
     : limits_(limits), log_(std::move(log)), epoll_(epoll_create1(EPOLL_CLOEXEC)) {}
 
 Connections::~Connections() = default;
+
+bool Connections::Has(const sockaddr_storage& peer) const {
+  constexpr uint8_t kEstablished = 1;  // of those that are no more, not all have been swept
+  std::lock_guard lock(mutex_);
+  const auto found = by_peer_.find(PeerKey(peer));
+  return found != by_peer_.end() && TcpInfoOf(found->second->socket.get()).tcpi_state == kEstablished;
+}
 
 bool Connections::Add(int socket, const sockaddr_storage& peer) {
   FileDescriptor duplicate(fcntl(socket, F_DUPFD_CLOEXEC, 0));
@@ -180,7 +227,84 @@ void Connections::ShutUnread() {
   }
 }
 
-std::shared_ptr<Connections::Connection> Connections::CallBegan(std::string_view peer) {
+std::chrono::milliseconds Connections::LookInterval() const {
+  constexpr std::chrono::microseconds kLeast(25'000);
+  constexpr std::chrono::microseconds kPerConnection(50);  // 1 or 2 of them are spent
+  return std::chrono::duration_cast<std::chrono::milliseconds>(kLeast + Count() * kPerConnection);
+}
+
+void Connections::ShutUnclaimed() {
+  const Clock::time_point now = Clock::now();
+  std::lock_guard lock(mutex_);
+  int64_t of_all = 0;
+  for (const auto& [id, connection] : by_id_) {
+    if (connection->is_shut) {
+      continue;
+    }
+    CountUnclaimed(*connection, now);
+    const int64_t lasting = LastingExcessOf(*connection);
+    if (lasting > AllowedUnclaimed(connection->host) || connection->excess > kMostUnclaimedAtOnce) {
+      Strike(connection->host);
+      Shut(*connection, kUnclaimed);
+    } else {
+      of_all += lasting;
+    }
+  }
+  while (of_all > kMostUnclaimedOfAll) {
+    Connection* most = nullptr;
+    for (const auto& [id, connection] : by_id_) {
+      if (!connection->is_shut && (most == nullptr || LastingExcessOf(*connection) > LastingExcessOf(*most))) {
+        most = connection.get();
+      }
+    }
+    of_all -= LastingExcessOf(*most);
+    Strike(most->host);
+    Shut(*most, kUnclaimed);
+  }
+}
+
+int64_t Connections::LastingExcessOf(const Connection& connection) {
+  // Calls may have been read, and not begun yet; with the second look they have. Before the first has begun, windows
+  // are too small for that.
+  const bool has_called = connection.known_calls_lately > 0 || connection.of_messages > 0;
+  return has_called ? std::min(connection.excess, connection.excess_before) : connection.excess;
+}
+
+void Connections::CountUnclaimed(Connection& connection, Clock::time_point now) const {
+  // In this order: what is claimed by now has come by now.
+  const auto claimed = static_cast<int64_t>(connection.claimed.exchange(0));
+  const tcp_info info = TcpInfoOf(connection.socket.get());
+  const uint64_t received = info.tcpi_bytes_received - std::exchange(connection.received, info.tcpi_bytes_received);
+  const uint64_t sent = info.tcpi_bytes_acked - std::exchange(connection.acknowledged, info.tcpi_bytes_acked);
+  const auto elapsed = std::chrono::duration_cast<std::chrono::milliseconds>(now - connection.looked);
+  const int64_t by_time = elapsed.count() * kClaimedPerSecond / 1000;
+  if (by_time > 0) {
+    connection.looked = now;
+  }
+  connection.unclaimed +=
+      static_cast<int64_t>(received) - claimed - static_cast<int64_t>(sent / kSentBytesPerClaimed) - by_time;
+  connection.unclaimed = std::max<int64_t>(connection.unclaimed, 0);
+  if (now - connection.last_end > kLately) {
+    connection.of_ended = 0;
+  }
+  const int64_t of_ended = std::min(connection.of_ended, connection.unclaimed);
+  connection.of_ended -= of_ended;
+  connection.unclaimed -= of_ended;
+  if (now - connection.known_since > kLately) {
+    connection.known_since = now;
+    connection.known_calls_lately = connection.known_calls;
+  }
+  connection.excess_before = connection.excess;
+  connection.excess = std::max<int64_t>(0, connection.unclaimed - UnderWayOf(connection) - kOfABeginning);
+}
+
+int64_t Connections::UnderWayOf(const Connection& connection) const {
+  const auto of_messages = static_cast<int64_t>(connection.of_messages.load());
+  const int64_t of_calls = connection.known_calls_lately * kUnderWayOfACall;
+  return std::min(of_calls + std::min(2 * of_messages, kMostClaimedByEnds), static_cast<int64_t>(limits_.max_received));
+}
+
+std::shared_ptr<Connections::Connection> Connections::CallBegan(std::string_view peer, bool is_known) {
   const std::string key = PeerKey(peer);
   std::lock_guard lock(mutex_);
   const auto found = by_peer_.find(key);
@@ -189,6 +313,11 @@ std::shared_ptr<Connections::Connection> Connections::CallBegan(std::string_view
   }
   const std::shared_ptr<Connection> connection = found->second;
   ++connection->calls;
+  connection->known_calls += is_known ? 1 : 0;
+  if (connection->known_calls > connection->known_calls_lately) {
+    connection->known_calls_lately = connection->known_calls;
+    connection->known_since = Clock::now();
+  }
   if (connection->is_shut) {
     ++orphans_;
     return connection;
@@ -203,15 +332,29 @@ std::shared_ptr<Connections::Connection> Connections::CallBegan(std::string_view
   return connection;
 }
 
-void Connections::CallEnded(Connection& connection, bool is_wasted) {
+void Connections::Claim(Connection& connection, uint64_t bytes) { connection.claimed += bytes; }
+
+void Connections::ClaimMessage(Connection& connection, uint64_t bytes) {
+  connection.of_messages += bytes;
+  Claim(connection, bytes);
+}
+
+void Connections::CallEnded(Connection& connection, const CallEnd& end) {
   std::lock_guard lock(mutex_);
   --connection.calls;
+  connection.known_calls -= end.is_known ? 1 : 0;
+  if (end.is_unfinished) {
+    connection.last_end = Clock::now();
+    connection.of_ended = end.is_known ? kMostClaimedByEnds
+                                       : std::max(connection.of_ended, std::min(connection.of_ended + kFirstWindow,
+                                                                                kMostClaimedByEndsOfStrangers));
+  }
   if (connection.is_shut) {
     --orphans_;
     return;
   }
   --calls_;
-  if (!is_wasted) {
+  if (!end.is_wasted) {
     return;
   }
   if (const Clock::time_point now = Clock::now(); now - connection.window_begin > kWindow) {
@@ -239,6 +382,15 @@ uint64_t Connections::ShutCount() const {
   return shut_count_;
 }
 
+uint64_t Connections::UnclaimedBytes() const {
+  std::lock_guard lock(mutex_);
+  uint64_t bytes = 0;
+  for (const auto& [id, connection] : by_id_) {
+    bytes += connection->is_shut ? 0 : static_cast<uint64_t>(std::max<int64_t>(0, connection->unclaimed));
+  }
+  return bytes;
+}
+
 void Connections::Orphan(Connection& connection) {
   if (!std::exchange(connection.is_shut, true)) {
     calls_ -= connection.calls;
@@ -251,6 +403,7 @@ void Connections::Shut(Connection& connection, std::string_view reason) {
   ++shut_count_;
   shutdown(connection.socket.get(), SHUT_RDWR);
   Discard(connection.socket.get());
+  ResetWhenClosed(connection.socket.get());
   LogFields fields;
   fields.Add("event", "connection_shut").Add("peer", PeerText(connection.key));
   fields.Add("calls", static_cast<uint64_t>(connection.calls)).Add("message", reason);
@@ -286,6 +439,10 @@ int Connections::AllowedCalls(const std::string& host) const {
 int Connections::AllowedWaste(const std::string& host) const {
   const int most = std::max(limits_.max_streams, kLeastWaste);
   return std::max(most >> StrikesOf(host), kLeastWasteOfABadHost);
+}
+
+int64_t Connections::AllowedUnclaimed(const std::string& host) const {
+  return std::max(kMostUnclaimed >> StrikesOf(host), kLeastUnclaimedOfABadHost);
 }
 
 void Connections::Strike(const std::string& name) {

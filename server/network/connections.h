@@ -23,12 +23,18 @@ namespace wellspace::server {
 struct ConnectionLimits {
   int max_streams = 1000;  // calls at once of a connection, as the peer is told; at least 1
   int max_calls = 10'000;  // of all connections together; at least 1
+  // Of messages that are under way on a connection, in bytes: what gRPC holds of all of them at most.
+  uint64_t max_received = uint64_t{512} << 20;
   // How long a peer may read nothing. Longer than any stream waits for its client, unless --stall-limit is raised.
   std::chrono::seconds max_unread{120};
 };
 
-// Shuts connections whose peers begin calls only to give them up ("rapid reset", CVE-2023-44487), and those that do not
-// read what they are sent.
+// Shuts connections whose peers begin calls only to give them up ("rapid reset", CVE-2023-44487), those that send what
+// belongs to no call, and those that do not read what they are sent.
+//
+// Bytes that came and that no call claims are those of frames that cost their sender nothing: WINDOW_UPDATE, SETTINGS,
+// PRIORITY, PING, empty DATA, CONTINUATION, unknown types. gRPC reads them without end. Calls claim their headers and
+// the messages that they were handed; what the peer is sent, and time, claim a little, for its windows and pings.
 //
 // A call is wasted if it ends within a second, and its client has cancelled it or has not sent any message. A
 // connection is shut
@@ -37,13 +43,21 @@ struct ConnectionLimits {
 //   - when all have more than `max_calls`, and it has the most;
 //   - when it has wasted more calls within a second than its host may: `max_streams` or kLeastWaste, whichever is more;
 //     half of it for each connection of the host that was shut lately, and never fewer than kLeastWasteOfABadHost;
+//   - when it has sent more than kMostUnclaimed bytes that no call claims, and none can have under way, when it is
+//     looked twice, or many more; half of it for each connection of the host that was shut lately, and never less than
+//     kLeastUnclaimedOfABadHost;
+//   - when all have sent more than kMostUnclaimedOfAll, and it the most;
 //   - when the peer has read nothing for `max_unread` although something waits for it.
+// A message that has not come whole is claimed by none yet. So a caller whom the server knows may have kUnderWayOfACall
+// under way for each call that it has, or had lately; and before calls begin, twice what came of messages before, up to
+// kMostClaimedByEnds, to which the windows of HTTP/2 may have grown. All of it is at most `max_received`.
+//
 // What the peer has sent to a connection that is shut, and gRPC has not read, is thrown away. What gRPC has read it
 // works off: as long as there are more than kMostOrphans such calls, no connection should be accepted.
 //
 // Each connection costs a second file descriptor.
 //
-// Thread safety: thread-safe; Add, Sweep and descriptor() are one thread's.
+// Thread safety: thread-safe; Sweep and ShutUnclaimed are one thread's.
 class Connections {
  public:
   class Connection;
@@ -56,11 +70,27 @@ class Connections {
   static constexpr std::chrono::seconds kWindow{1};
   static constexpr std::chrono::seconds kForgivenAfter{10};  // one connection that was shut
 
+  // In bytes. gRPC makes up to 100 bytes of memory of one of headers whose end does not come.
+  static constexpr int64_t kMostUnclaimed = int64_t{512} << 10;
+  static constexpr int64_t kMostUnclaimedAtOnce = int64_t{64} << 20;  // needs no second look
+  static constexpr int64_t kLeastUnclaimedOfABadHost = int64_t{128} << 10;
+  static constexpr int64_t kMostUnclaimedOfAll = int64_t{4} << 20;
+  static constexpr int64_t kUnderWayOfACall = int64_t{8} << 20;  // a message, and a window
+  static constexpr int64_t kFirstWindow = int64_t{64} << 10;     // with which a connection and a call begin
+  // What was under way of a call that ended before its request did is claimed at its end, and lately after it: of
+  // strangers no more than kMostClaimedByEndsOfStrangers.
+  static constexpr int64_t kMostClaimedByEnds = int64_t{64} << 20;
+  static constexpr int64_t kMostClaimedByEndsOfStrangers = int64_t{1} << 20;
+  static constexpr std::chrono::seconds kLately{2};
+
   Connections(const ConnectionLimits& limits, std::shared_ptr<spdlog::logger> log);
   ~Connections();
   Connections(const Connections&) = delete;
   Connections& operator=(const Connections&) = delete;
 
+  // Whether there is a connection from `peer` already, to another address of this machine. Calls of a second one could
+  // not be told from its own.
+  bool Has(const sockaddr_storage& peer) const;
   // Takes note of a connection that was accepted from `peer` and is about to be handed to gRPC. False when there is no
   // descriptor left.
   bool Add(int socket, const sockaddr_storage& peer);
@@ -71,12 +101,25 @@ class Connections {
   void Sweep();
   // Shuts those whose peers do not read. To be called every few seconds.
   void ShutUnread();
+  // Shuts those that send what no call claims. To be called as often as LookInterval says.
+  void ShutUnclaimed();
+  // So often that little comes meanwhile, and that looking takes little of a thread's time.
+  std::chrono::milliseconds LookInterval() const;
 
   // A call has begun on the connection from `peer`, as gRPC writes it: "ipv4:127.0.0.1:1234". Null when there is no
-  // such connection.
-  std::shared_ptr<Connection> CallBegan(std::string_view peer);
+  // such connection. `is_known`: the server knows who calls.
+  std::shared_ptr<Connection> CallBegan(std::string_view peer, bool is_known);
+  // The call accounts for `bytes` that came.
+  static void Claim(Connection& connection, uint64_t bytes);
+  // The same for a message of a caller whom the server knows.
+  static void ClaimMessage(Connection& connection, uint64_t bytes);
+  struct CallEnd {
+    bool is_known = false;  // as of CallBegan
+    bool is_wasted = false;
+    bool is_unfinished = false;  // more of its request may come
+  };
   // It has ended.
-  void CallEnded(Connection& connection, bool is_wasted);
+  void CallEnded(Connection& connection, const CallEnd& end);
 
   // So many calls of connections that were shut or closed go on that more connections had better wait.
   bool IsBusyWithTheShut() const;
@@ -85,6 +128,8 @@ class Connections {
   size_t Count() const;
   // Connections that were shut.
   uint64_t ShutCount() const;
+  // Bytes that came on connections that are open, and that no call has claimed, when it was last looked.
+  uint64_t UnclaimedBytes() const;
 
  private:
   struct Host;
@@ -98,6 +143,14 @@ class Connections {
   // How many calls a connection of `host` may have, and waste within a second.
   int AllowedCalls(const std::string& host) const;
   int AllowedWaste(const std::string& host) const;
+  // How many bytes a connection of `host` may send that no call claims.
+  int64_t AllowedUnclaimed(const std::string& host) const;
+  // Takes note of what has come and was claimed since the last look.
+  void CountUnclaimed(Connection& connection, Clock::time_point now) const;
+  // Bytes that calls of the connection may have under way.
+  int64_t UnderWayOf(const Connection& connection) const;
+  // Bytes that no call of the connection can have under way, in this look and the last one.
+  static int64_t LastingExcessOf(const Connection& connection);
   void Strike(const std::string& host);
 
   const ConnectionLimits limits_;

@@ -1,6 +1,7 @@
 #include "server/observability/call_observer.h"
 
 #include <algorithm>
+#include <array>
 #include <random>
 #include <string_view>
 #include <utility>
@@ -10,6 +11,8 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/time/time.h"
+#include "google/protobuf/message.h"
+#include "grpcpp/support/byte_buffer.h"
 #include "server/base/clock.h"
 #include "server/log/log_fields.h"
 #include "server/network/connections.h"
@@ -26,6 +29,40 @@ constexpr std::string_view kHealth = "/grpc.health.v1.Health/";
 constexpr std::string_view kChannelz = "grpc.channelz.v1.Channelz";
 // https://www.w3.org/TR/trace-context/: version-trace-parent-flags, in lower-case hexadecimal digits.
 constexpr std::string_view kTraceparentShape = "00-00000000000000000000000000000000-0000000000000000-00";
+
+// What a connection takes for a call besides its own bytes: frames of a call's beginning and end, of each header, of
+// each message. Records of TLS, each of 22 bytes more, are about as long as frames.
+constexpr uint64_t kHeadersOverhead = 512;
+constexpr uint64_t kHeaderOverhead = 16;
+constexpr uint64_t kMostHeaders = 16 << 10;  // peers are told to send 8 KiB
+constexpr uint64_t kMessageOverhead = 256;
+constexpr uint64_t kBytesPerOverhead = 16;
+
+// Methods of wellspace.v1 whose requests the services read as bytes.
+constexpr std::array<std::string_view, 9> kReadAsBytes = {"AddSegments",
+                                                          "ApproximateNearestNeighbors",
+                                                          "ClippedVoronoiCells",
+                                                          "DownloadMesh",
+                                                          "EstimateMesh",
+                                                          "MeshPoints",
+                                                          "SetSizes",
+                                                          "UploadPoints",
+                                                          "VoronoiCells"};
+
+// How many bytes a request has that an interceptor is shown, which does not learn its type. A test sends one to each
+// method.
+using MessageBytes = uint64_t (*)(const void*);
+MessageBytes MessageBytesOf(const CallMetrics::Method& method) {
+  if (!std::string_view(method.service).starts_with("wellspace.v1.")) {
+    return [](const void*) { return uint64_t{0}; };  // gRPC's own, whose requests are names
+  }
+  if (std::ranges::find(kReadAsBytes, method.name) != kReadAsBytes.end()) {
+    return [](const void* message) -> uint64_t { return static_cast<const grpc::ByteBuffer*>(message)->Length(); };
+  }
+  return [](const void* message) -> uint64_t {
+    return static_cast<const google::protobuf::Message*>(message)->ByteSizeLong();
+  };
+}
 
 // The value of metadata `key`; empty if the client did not send it.
 std::string_view Metadata(const grpc::ServerContextBase& context, const char* key) {
@@ -66,13 +103,16 @@ class CallObserver::Interceptor final : public grpc::experimental::Interceptor {
       : observer_(observer),
         method_(observer.metrics_.Of(info.method())),
         path_(info.method()),
+        streams_requests_(info.type() == grpc::experimental::ServerRpcInfo::Type::CLIENT_STREAMING ||
+                          info.type() == grpc::experimental::ServerRpcInfo::Type::BIDI_STREAMING),
+        message_bytes_(MessageBytesOf(method_)),
         context_(info.server_context()),
         start_(SinceBoot()),
         began_(Connections::Clock::now()) {
-    FindPeer();
     // gRPC reads metadata and certificates into the context when they are first asked for, and not thread-safely: here,
     // before anything else knows of the call.
     tenant_ = observer_.tenant_of_(*context_);
+    FindPeer();
     const std::string_view request_id = Metadata(*context_, kRequestId);
     request_id_ = IsRequestId(request_id) ? std::string(request_id) : observer_.MakeRequestId();
     if (const std::string_view traceparent = Metadata(*context_, "traceparent"); IsTraceparent(traceparent)) {
@@ -85,7 +125,10 @@ class CallObserver::Interceptor final : public grpc::experimental::Interceptor {
   ~Interceptor() override {
     if (connection_ != nullptr) {
       const bool is_short = Connections::Clock::now() - began_ < Connections::kWindow;
-      observer_.connections_.CallEnded(*connection_, is_short && (is_cancelled_ || !has_message_));
+      observer_.connections_.CallEnded(*connection_,
+                                       {.is_known = !tenant_.empty(),
+                                        .is_wasted = is_short && (is_cancelled_ || !has_message_),
+                                        .is_unfinished = is_cancelled_ || (streams_requests_ && !has_succeeded_)});
     }
     observer_.Remove(context_);
   }
@@ -98,6 +141,7 @@ class CallObserver::Interceptor final : public grpc::experimental::Interceptor {
         methods->GetRecvMessage() != nullptr) {
       method_.received->Increment();
       has_message_ = true;
+      ClaimMessage(kMessageOverhead + BytesOf(methods->GetRecvMessage()));
     }
     // A synchronous call, as reflection's, would wait here.
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::POST_RECV_CLOSE) &&
@@ -106,11 +150,13 @@ class CallObserver::Interceptor final : public grpc::experimental::Interceptor {
     }
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_MESSAGE)) {
       method_.sent->Increment();
+      Claim(kMessageOverhead);  // the peer opens its windows for what it has read
     }
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_STATUS)) {
       methods->GetSendTrailingMetadata()->emplace(kRequestId, request_id_);
       const grpc::Status status = ServersStatus(methods->GetSendStatus());
       methods->ModifySendStatus(status);
+      has_succeeded_ = status.ok();
       End(status);
     }
     methods->Proceed();
@@ -144,7 +190,33 @@ class CallObserver::Interceptor final : public grpc::experimental::Interceptor {
   // from the beginning.
   void FindPeer() {
     peer_ = context_->peer();
-    connection_ = observer_.connections_.CallBegan(peer_);
+    connection_ = observer_.connections_.CallBegan(peer_, !tenant_.empty());
+    uint64_t headers = kHeadersOverhead + path_.size();
+    for (const auto& [name, value] : context_->client_metadata()) {
+      headers += kHeaderOverhead + name.size() + value.size();
+    }
+    Claim(std::min(headers, kMostHeaders));
+  }
+
+  // Bytes of the connection, of those that came, are this call's.
+  void Claim(uint64_t bytes) {
+    if (connection_ != nullptr) {
+      Connections::Claim(*connection_, bytes);
+    }
+  }
+
+  void ClaimMessage(uint64_t bytes) {
+    if (connection_ != nullptr && !tenant_.empty()) {
+      Connections::ClaimMessage(*connection_, bytes);
+    } else {
+      Claim(bytes);
+    }
+  }
+
+  // How many bytes came for a message, and what frames and TLS add to them.
+  uint64_t BytesOf(const void* message) const {
+    const uint64_t bytes = message_bytes_(message);
+    return bytes + bytes / kBytesPerOverhead;
   }
 
   void End(const grpc::Status& status) {
@@ -178,6 +250,8 @@ class CallObserver::Interceptor final : public grpc::experimental::Interceptor {
   CallObserver& observer_;
   const CallMetrics::Method& method_;
   const std::string path_;  // "/service/method"
+  const bool streams_requests_;
+  const MessageBytes message_bytes_;
   grpc::ServerContextBase* const context_;
   const absl::Duration start_;  // since boot
   const Connections::Clock::time_point began_;
@@ -185,6 +259,7 @@ class CallObserver::Interceptor final : public grpc::experimental::Interceptor {
   std::shared_ptr<Connections::Connection> connection_;  // null: not from the network
   std::atomic<bool> has_message_ = false;
   std::atomic<bool> is_cancelled_ = false;
+  std::atomic<bool> has_succeeded_ = false;
   std::string tenant_;
   std::string request_id_;
   std::string traceparent_;  // empty: none

@@ -30,6 +30,9 @@ Observability::Observability(const std::vector<std::string>& services, std::shar
   metrics_.AddCounter("wellspace_connections_shut_total",
                       "Connections that were shut for what their peers did with them.",
                       [&connections] { return static_cast<double>(connections.ShutCount()); });
+  metrics_.AddGauge("wellspace_unclaimed_bytes",
+                    "Bytes that came on open connections and are of no request that has come whole.",
+                    [&connections] { return static_cast<double>(connections.UnclaimedBytes()); });
   const auto add = [this](const char* name, const char* help, const std::atomic<uint64_t>& counter) {
     metrics_.AddCounter(name, help, [&counter] { return static_cast<double>(counter.load()); });
   };

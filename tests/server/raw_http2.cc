@@ -139,6 +139,11 @@ bool RawConnection::Begin() {
          Send(Frame{.type = Frame::kSettings, .flags = Frame::kAck});
 }
 
+void RawConnection::Discard() {
+  while (recv(socket_, nullptr, size_t{1} << 20, MSG_TRUNC | MSG_DONTWAIT) > 0) {
+  }
+}
+
 std::string RawConnection::ReadBytes(size_t size) {
   std::string bytes(size, '\0');
   size_t taken = 0;

@@ -74,6 +74,9 @@ class RawConnection {
   // of its limits for agreed upon. False when the server has closed the connection.
   bool Begin();
 
+  // Throws away what has come.
+  void Discard();
+
   // The next frame. None when the server has closed the connection, or sends nothing for a minute: the test has failed.
   std::optional<Frame> Read();
   // The next frame of `type`; those between are left out.

@@ -6,9 +6,11 @@
 #include <poll.h>
 #include <sys/socket.h>
 
+#include <algorithm>
 #include <chrono>
 #include <memory>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -79,11 +81,17 @@ class ConnectionsTest : public ::testing::Test {
   // `count` calls that are over at once.
   void Waste(const char* peer, int count) {
     for (int i = 0; i < count; ++i) {
-      const auto connection = connections_.CallBegan(peer);
+      const auto connection = connections_.CallBegan(peer, false);
       if (connection != nullptr) {
-        connections_.CallEnded(*connection, true);
+        connections_.CallEnded(*connection, {.is_wasted = true});
       }
     }
+  }
+
+  // Twice: what is there for a moment does not count.
+  void Look() {
+    connections_.ShutUnclaimed();
+    connections_.ShutUnclaimed();
   }
 
   Connections connections_{{.max_streams = kMaxStreams, .max_calls = 1000}, std::make_shared<spdlog::logger>("none")};
@@ -93,10 +101,10 @@ TEST_F(ConnectionsTest, AsManyCallsAsClientsAreToldAndSomeMoreAreServed) {
   const Pair pair;
   ASSERT_TRUE(connections_.Add(pair.server.get(), Ipv4("10.0.0.1", 1)));
   for (int i = 0; i < kMostCalls; ++i) {
-    ASSERT_NE(connections_.CallBegan(kPeer), nullptr);
+    ASSERT_NE(connections_.CallBegan(kPeer, false), nullptr);
   }
   EXPECT_FALSE(pair.IsShut());
-  connections_.CallBegan(kPeer);
+  connections_.CallBegan(kPeer, false);
   EXPECT_TRUE(pair.IsShut());
   EXPECT_EQ(connections_.ShutCount(), 1u);
   EXPECT_TRUE(connections_.IsBusyWithTheShut() == (kMostCalls + 1 > Connections::kMostOrphans));
@@ -106,7 +114,7 @@ TEST_F(ConnectionsTest, CallsThatHaveEndedDoNotCount) {
   const Pair pair;
   ASSERT_TRUE(connections_.Add(pair.server.get(), Ipv4("10.0.0.1", 1)));
   for (int i = 0; i < 10 * kMostCalls; ++i) {
-    connections_.CallEnded(*connections_.CallBegan(kPeer), false);
+    connections_.CallEnded(*connections_.CallBegan(kPeer, false), {});
   }
   EXPECT_FALSE(pair.IsShut());
 }
@@ -133,13 +141,13 @@ TEST_F(ConnectionsTest, AllTogetherAreBoundedAtTheCostOfTheBusiest) {
     ASSERT_TRUE(connections_.Add(pairs[i].server.get(), Ipv4("10.0.0.1", i)));
     const int calls = i == 2 ? 300 : 175;
     for (int call = 0; call < calls; ++call) {
-      connections_.CallBegan(absl::StrCat("ipv4:10.0.0.1:", i));
+      connections_.CallBegan(absl::StrCat("ipv4:10.0.0.1:", i), false);
     }
   }
   for (size_t i = 0; i < pairs.size(); ++i) {
     EXPECT_EQ(pairs[i].IsShut(), false) << i;
   }
-  connections_.CallBegan("ipv4:10.0.0.1:0");
+  connections_.CallBegan("ipv4:10.0.0.1:0", false);
   for (size_t i = 0; i < pairs.size(); ++i) {
     EXPECT_EQ(pairs[i].IsShut(), i == 2) << i;
   }
@@ -148,14 +156,14 @@ TEST_F(ConnectionsTest, AllTogetherAreBoundedAtTheCostOfTheBusiest) {
 TEST_F(ConnectionsTest, WhatIsClosedIsForgotten) {
   Pair pair;
   ASSERT_TRUE(connections_.Add(pair.server.get(), Ipv4("10.0.0.1", 1)));
-  const auto connection = connections_.CallBegan(kPeer);
+  const auto connection = connections_.CallBegan(kPeer, false);
   connections_.Sweep();
   EXPECT_EQ(connections_.Count(), 1u);
   shutdown(pair.server.get(), SHUT_RDWR);  // as gRPC does
   connections_.Sweep();
   EXPECT_EQ(connections_.Count(), 0u);
-  EXPECT_EQ(connections_.CallBegan(kPeer), nullptr);
-  connections_.CallEnded(*connection, true);
+  EXPECT_EQ(connections_.CallBegan(kPeer, false), nullptr);
+  connections_.CallEnded(*connection, {.is_wasted = true});
   EXPECT_EQ(connections_.ShutCount(), 0u);
 }
 
@@ -214,9 +222,194 @@ TEST_F(ConnectionsTest, APeerWhoFoundTheWindowClosedHearsOfTheEndAtOnce) {
   EXPECT_TRUE(HasHungUp(peer.get(), kPatience));
 }
 
+// A connection over TCP, of which gRPC has read all that came.
+class SendingPeer {
+ public:
+  SendingPeer(Connections& connections, uint16_t port, const std::string& host = "10.0.0.1")
+      : name_(absl::StrCat("ipv4:", host, ":", port)) {
+    std::tie(server_, peer_) = TcpPair();
+    EXPECT_TRUE(connections.Add(server_.get(), Ipv4(host, port)));
+  }
+
+  const std::string& name() const { return name_; }
+
+  void Send(int64_t bytes) {
+    std::string piece(65536, 'x');
+    while (bytes > 0) {
+      piece.resize(std::min<size_t>(piece.size(), bytes));
+      ASSERT_EQ(send(peer_.get(), piece.data(), piece.size(), MSG_NOSIGNAL), static_cast<ssize_t>(piece.size()));
+      bytes -= static_cast<int64_t>(piece.size());
+      // The last of it has come when it is read.
+      for (size_t left = piece.size(); left > 0;) {
+        pollfd readable = {.fd = server_.get(), .events = POLLIN, .revents = 0};
+        ASSERT_EQ(poll(&readable, 1, -1), 1);
+        const ssize_t got = recv(server_.get(), nullptr, left, MSG_TRUNC | MSG_DONTWAIT);
+        ASSERT_GT(got, 0);
+        left -= got;
+      }
+    }
+  }
+
+  bool IsShut() const { return HasHungUp(server_.get()); }
+
+ private:
+  const std::string name_;
+  FileDescriptor server_;
+  FileDescriptor peer_;
+};
+
+constexpr int64_t kLittle = 4096;
+constexpr int64_t kBeginning = 8192;
+
+TEST_F(ConnectionsTest, WhatNoCallClaimsIsBoundedAndHalvedForAHostThatWasShut) {
+  constexpr int64_t kMost = Connections::kMostUnclaimed;
+  constexpr int64_t kLeast = Connections::kLeastUnclaimedOfABadHost;
+  for (const int64_t allowed : {kMost, kMost / 2, kLeast, kLeast}) {
+    SendingPeer peer(connections_, 1);
+    peer.Send(kBeginning + allowed);
+    Look();
+    EXPECT_FALSE(peer.IsShut()) << allowed;
+    peer.Send(kLittle);
+    Look();
+    EXPECT_TRUE(peer.IsShut()) << allowed;
+    connections_.Sweep();
+  }
+  EXPECT_EQ(connections_.ShutCount(), 4u);
+}
+
+TEST_F(ConnectionsTest, WhatComesBeforeAnyCallIsLookedAtOnce) {
+  SendingPeer peer(connections_, 1);
+  peer.Send(Connections::kMostUnclaimed + kBeginning + kLittle);
+  connections_.ShutUnclaimed();
+  EXPECT_TRUE(peer.IsShut());
+}
+
+TEST_F(ConnectionsTest, WhatComesBehindCallsIsLookedAtTwiceUnlessItIsMuch) {
+  constexpr int64_t kUnbegun = Connections::kUnderWayOfACall + 2 * Connections::kMostUnclaimed;
+  SendingPeer peer(connections_, 1);
+  const auto connection = connections_.CallBegan(peer.name(), true);
+  connections_.CallEnded(*connection, {.is_known = true});
+  peer.Send(kUnbegun);
+  connections_.ShutUnclaimed();
+  EXPECT_FALSE(peer.IsShut());
+  // Its calls have begun by now, and have had their messages.
+  Connections::Claim(*connection, kUnbegun);
+  Look();
+  EXPECT_FALSE(peer.IsShut());
+  peer.Send(Connections::kMostUnclaimedAtOnce + Connections::kUnderWayOfACall + kBeginning + kLittle);
+  connections_.ShutUnclaimed();
+  EXPECT_TRUE(peer.IsShut());
+}
+
+TEST_F(ConnectionsTest, WhatCallsClaimIsNotBounded) {
+  SendingPeer peer(connections_, 1);
+  const auto connection = connections_.CallBegan(peer.name(), false);
+  for (int i = 0; i < 20; ++i) {
+    peer.Send(Connections::kMostUnclaimed);
+    Connections::Claim(*connection, Connections::kMostUnclaimed);
+    Look();
+    ASSERT_FALSE(peer.IsShut()) << i;
+  }
+  EXPECT_EQ(connections_.UnclaimedBytes(), 0u);
+  // What was claimed is no credit.
+  Connections::Claim(*connection, 10 * Connections::kMostUnclaimed);
+  Look();
+  peer.Send(Connections::kMostUnclaimed + kBeginning + kLittle);
+  Look();
+  EXPECT_TRUE(peer.IsShut());
+}
+
+class ConnectionsOfCallers : public ConnectionsTest, public ::testing::WithParamInterface<bool> {};
+
+TEST_P(ConnectionsOfCallers, MayHaveMessagesUnderWayIfTheyAreKnown) {
+  const bool is_known = GetParam();
+  SendingPeer peer(connections_, 1);
+  constexpr int kCalls = 3;
+  for (int i = 0; i < kCalls; ++i) {
+    connections_.CallBegan(peer.name(), is_known);
+  }
+  peer.Send(Connections::kMostUnclaimed + kBeginning + (is_known ? kCalls * Connections::kUnderWayOfACall : 0));
+  Look();
+  EXPECT_FALSE(peer.IsShut());
+  peer.Send(kLittle);
+  Look();
+  EXPECT_TRUE(peer.IsShut());
+}
+
+INSTANTIATE_TEST_SUITE_P(Both, ConnectionsOfCallers, ::testing::Bool());
+
+// Windows have grown with what came before, and calls are read before they begin.
+TEST_F(ConnectionsTest, MoreMayBeUnderWayWhereMessagesHaveCome) {
+  constexpr int64_t kMessage = int64_t{1} << 20;
+  SendingPeer peer(connections_, 1);
+  const auto connection = connections_.CallBegan(peer.name(), true);
+  peer.Send(kMessage);
+  Connections::ClaimMessage(*connection, kMessage);
+  Look();
+  connections_.CallEnded(*connection, {.is_known = true});
+  peer.Send(Connections::kMostUnclaimed + kBeginning + Connections::kUnderWayOfACall + 2 * kMessage);
+  Look();
+  EXPECT_FALSE(peer.IsShut());
+  peer.Send(kLittle);
+  Look();
+  EXPECT_TRUE(peer.IsShut());
+}
+
+TEST_F(ConnectionsTest, CallsThatEndBeforeTheirRequestClaimWhatIsStillToCome) {
+  SendingPeer peer(connections_, 1);
+  const auto end_one = [&] {
+    const auto connection = connections_.CallBegan(peer.name(), false);
+    connections_.CallEnded(*connection, {.is_known = false, .is_unfinished = true});
+  };
+  for (int i = 0; i < 50; ++i) {
+    end_one();
+    Look();
+    peer.Send(Connections::kFirstWindow);
+    Look();
+    ASSERT_FALSE(peer.IsShut()) << i;
+  }
+  EXPECT_EQ(connections_.UnclaimedBytes(), 0u);
+  // Not of all at once: it would cost nothing again.
+  for (int i = 0; i < 1000; ++i) {
+    end_one();
+  }
+  peer.Send(Connections::kMostClaimedByEndsOfStrangers + Connections::kMostUnclaimed + kBeginning + kLittle);
+  Look();
+  EXPECT_TRUE(peer.IsShut());
+}
+
+TEST_F(ConnectionsTest, WhatNoCallClaimsIsBoundedOfAllTogetherAtTheCostOfTheWorst) {
+  constexpr int64_t kEach = Connections::kMostUnclaimedOfAll / 10 + kBeginning;
+  std::vector<std::unique_ptr<SendingPeer>> peers;
+  for (uint16_t i = 0; i < 10; ++i) {
+    peers.push_back(std::make_unique<SendingPeer>(connections_, i, absl::StrCat("10.0.1.", i)));
+    peers.back()->Send(i == 2 ? kEach : kEach - kLittle);
+  }
+  Look();
+  EXPECT_EQ(connections_.ShutCount(), 0u);
+  peers[0]->Send(5 * kLittle);
+  peers[2]->Send(6 * kLittle);
+  Look();
+  for (size_t i = 0; i < peers.size(); ++i) {
+    EXPECT_EQ(peers[i]->IsShut(), i == 2) << i;
+  }
+}
+
+TEST_F(ConnectionsTest, OnePeerIsThereOnce) {
+  const sockaddr_storage address = Ipv4("10.0.0.1", 1);
+  EXPECT_FALSE(connections_.Has(address));
+  {
+    SendingPeer peer(connections_, 1);
+    EXPECT_TRUE(connections_.Has(address));
+    EXPECT_FALSE(connections_.Has(Ipv4("10.0.0.1", 2)));
+  }
+  // It is no more, though not swept yet.
+  EXPECT_FALSE(connections_.Has(address));
+}
+
 TEST_F(ConnectionsTest, CallsOfNoConnectionAreNotCounted) {
-  EXPECT_EQ(connections_.CallBegan("unix:"), nullptr);
-  EXPECT_EQ(connections_.CallBegan("unknown"), nullptr);
+  EXPECT_EQ(connections_.CallBegan("unix:", false), nullptr);
+  EXPECT_EQ(connections_.CallBegan("unknown", false), nullptr);
 }
 
 }  // namespace

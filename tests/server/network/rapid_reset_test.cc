@@ -1,10 +1,8 @@
 // The real server among peers that begin calls only to give them up, as fast as they can: what it holds stays small,
 // others are served, and soon it is as if nothing had been. WELLSPACE_STREAMS says how many calls each attack begins.
 #include <algorithm>
-#include <atomic>
 #include <memory>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -15,6 +13,7 @@
 #include "gtest/gtest.h"
 #include "tests/server/daemon.h"
 #include "tests/server/http_get.h"
+#include "tests/server/observer.h"
 #include "tests/server/raw_http2.h"
 #include "tests/support/temporary_folder.h"
 
@@ -76,35 +75,6 @@ int Attack(const std::string& address, const std::string& path, int streams, boo
   }
   return closed;
 }
-
-// Another client, that asks all the time.
-class Observer {
- public:
-  explicit Observer(client::Client client) : thread_([this, client]() mutable { Run(client); }) {}
-  ~Observer() { Stop(); }
-
-  // The longest time that an answer took, or none at all.
-  absl::Duration Stop() {
-    stop_ = true;
-    if (thread_.joinable()) {
-      thread_.join();
-    }
-    return longest_;
-  }
-
- private:
-  void Run(client::Client& client) {
-    while (!stop_) {
-      const absl::Time begin = absl::Now();
-      const bool is_served = client.GetServerInfo().ok();
-      longest_ = std::max(longest_, is_served ? absl::Now() - begin : absl::InfiniteDuration());
-    }
-  }
-
-  std::atomic<bool> stop_ = false;
-  absl::Duration longest_;
-  std::thread thread_;
-};
 
 class RapidResetTest : public ::testing::Test {
  protected:
