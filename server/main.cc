@@ -20,6 +20,7 @@
 
 #include "CLI/CLI.hpp"
 #include "absl/time/time.h"
+#include "server/base/descriptor_limit.h"
 #include "server/base/options.h"
 #include "server/base/resources.h"
 #include "server/base/version.h"
@@ -195,15 +196,15 @@ absl::StatusOr<std::unique_ptr<DurableLog>> OpenSessionLog(const Flags& flags,
   if (flags.data.empty() || flags.is_ephemeral) {
     return nullptr;
   }
-  return DurableLog::Open(
-      {.folder = flags.data,
-       .on_failure =
-           [log](const absl::Status& cause) {
-             log->critical(LogFields().Add("event", "store_failed").Add("error", std::string(cause.message())).text());
-             log->flush();
-             _exit(1);
-           },
-       .ballast_bytes = BallastBytesFor(flags.data)});
+  const auto on_failure = [log](const absl::Status& cause) {
+    log->critical(LogFields().Add("event", "store_failed").Add("error", std::string(cause.message())).text());
+    log->flush();
+    _exit(1);
+  };
+  return DurableLog::Open({.folder = flags.data,
+                           .on_failure = on_failure,
+                           .ballast_bytes = BallastBytesFor(flags.data),
+                           .max_written_files = MaxWrittenFiles(DescriptorLimit())});
 }
 
 // SIGTERM and SIGINT, blocked in this thread and all that it starts later, to be waited for.
@@ -230,6 +231,7 @@ class StopSignals {
 };
 
 int Main(int argc, char** argv) {
+  signal(SIGXFSZ, SIG_IGN);  // a file that must not grow further is a full disk
   Flags flags;
   flags.server.listen = "127.0.0.1:7233";
   const Resources resources = ReadResources();
@@ -257,6 +259,7 @@ int Main(int argc, char** argv) {
   mallopt(M_MMAP_THRESHOLD, kReturnedBytes);
   StopSignals signals;
   signal(SIGPIPE, SIG_IGN);  // standard output or error may be a pipe whose reader has gone
+  RaiseDescriptorLimit();
   const std::shared_ptr<spdlog::logger> log =
       MakeLogger(flags.log_level, flags.log_format == "json" ? LogFormat::kJson : LogFormat::kText,
                  std::make_shared<LogWriter>(STDERR_FILENO));

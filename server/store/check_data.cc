@@ -65,7 +65,7 @@ class SessionCheck {
       Add("there are ", state_.points(), " points, and ", points, " in its steps");
       return;
     }
-    const PointFile file(files_, std::make_shared<StoreHealth>(nullptr),
+    const PointFile file(files_, std::make_shared<StoreHealth>(nullptr), /*written=*/nullptr,
                          paths_.points(state_.name(), state_.points_file()), state_.parameters().dimension(),
                          std::move(committed));
     Add(file.Checksum(0, file.coordinate_count()).status());

@@ -39,11 +39,15 @@ uint64_t BytesOf(const SessionChange& change) {
 }
 
 // Whether files may be removed. Not after a failure: the change that was under way may have been written down, and name
-// what its owner believes to be obsolete. Not during a back-up: its copy of the rows names what is obsolete by now.
+// what its owner believes to be obsolete. Not during a back-up: its copy of the rows names what is obsolete by now. Nor
+// when it is not known whether there is one, as without descriptors.
 bool MayRemove(const StoreHealth& health, const DataPaths& paths, FileSystem& files) {
-  const auto is_locked = [](const auto& lock) { return lock.status().code() == absl::StatusCode::kAborted; };
-  return health.Check().ok() && !is_locked(files.Lock(paths.back_up_lock())) &&
-         !is_locked(files.LockFolder(paths.files()));
+  const auto may_be_locked = [](const auto& lock) {
+    return lock.status().code() == absl::StatusCode::kAborted ||
+           lock.status().code() == absl::StatusCode::kResourceExhausted;
+  };
+  return health.Check().ok() && !may_be_locked(files.Lock(paths.back_up_lock())) &&
+         !may_be_locked(files.LockFolder(paths.files()));
 }
 
 // Whether it is not known, after this error, what is on the disk.
@@ -64,7 +68,7 @@ uint64_t BallastBytesFor(const std::string& folder) {
 }
 
 DurableLog::DurableLog(const DurableLogOptions& options, std::unique_ptr<DataFolder> folder,
-                       std::unique_ptr<SessionTables> tables)
+                       std::unique_ptr<SessionTables> tables, std::unique_ptr<Folder> files_folder)
     : files_(*options.files),
       now_(options.now),
       max_mesh_chunk_bytes_(options.max_mesh_chunk_bytes),
@@ -72,9 +76,9 @@ DurableLog::DurableLog(const DurableLogOptions& options, std::unique_ptr<DataFol
       health_(std::make_shared<StoreHealth>(options.on_failure, ballast_)),
       folder_(std::move(folder)),
       tables_(std::move(tables)),
-      in_use_(std::make_shared<FilesInUse>(files_, [health = health_, paths = folder_->paths(), files = &files_] {
-        return MayRemove(*health, paths, *files);
-      })) {}
+      in_use_(std::make_shared<FilesInUse>(files_, [health = health_, paths = folder_->paths(),
+                                                    files = &files_] { return MayRemove(*health, paths, *files); })),
+      written_(std::make_shared<WrittenFiles>(std::move(files_folder), options.max_written_files)) {}
 
 absl::StatusOr<std::unique_ptr<DurableLog>> DurableLog::Open(const DurableLogOptions& options) {
   HideFolder(options.folder);
@@ -91,7 +95,9 @@ absl::StatusOr<std::unique_ptr<DurableLog>> DurableLog::Open(const DurableLogOpt
                              SessionTables::Open(folder->paths().database(), tables_options));
   // The names of the write-ahead log, and of its mark.
   WELLSPACE_RETURN_IF_ERROR(options.files->SynchronizeFolder(options.folder));
-  std::unique_ptr<DurableLog> log(new DurableLog(options, std::move(folder), std::move(tables)));
+  WELLSPACE_ASSIGN_OR_RETURN(std::unique_ptr<Folder> files_folder, options.files->OpenFolder(folder->paths().files()));
+  std::unique_ptr<DurableLog> log(
+      new DurableLog(options, std::move(folder), std::move(tables), std::move(files_folder)));
   log->ballast_->Fill().IgnoreError();  // without room for it what there is can be read and deleted
   return log;
 }
@@ -249,7 +255,8 @@ std::unique_ptr<PointStore> DurableLog::OpenPoints(const std::string& session, i
   // A file that no change names yet is not garbage, and one whose session is deleted stays for those who still have it:
   // they are to find that the session is gone, and no damage.
   std::unique_ptr<FilesInUse::Use> use = in_use_->Take(path, /*is_written=*/committed.empty());
-  return std::make_unique<PointFile>(files_, health_, std::move(path), dimension, std::move(committed), std::move(use));
+  return std::make_unique<PointFile>(files_, health_, written_, std::move(path), dimension, std::move(committed),
+                                     std::move(use));
 }
 
 void DurableLog::DropPoints(const std::string& session, uint64_t number) {
@@ -263,8 +270,9 @@ absl::StatusOr<std::shared_ptr<MeshSnapshot>> DurableLog::KeepMesh(const std::st
   // RemoveGarbage is to leave the file alone that has this name first, too.
   const std::unique_ptr<FilesInUse::Use> writing =
       in_use_->Take(path + std::string(kTemporaryEnd), /*is_written=*/true);
-  WELLSPACE_ASSIGN_OR_RETURN(store::v1::MeshRecord record,
-                             WriteMeshFile(files_, *health_, path, revision, mesh, context, max_mesh_chunk_bytes_));
+  WELLSPACE_ASSIGN_OR_RETURN(
+      store::v1::MeshRecord record,
+      WriteMeshFile(files_, written_->folder(), *health_, path, revision, mesh, context, max_mesh_chunk_bytes_));
   return std::make_shared<MeshFile>(files_, std::move(record), std::move(use), buffers_);
 }
 

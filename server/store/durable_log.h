@@ -21,6 +21,7 @@
 #include "server/store/session_log.h"
 #include "server/store/session_tables.h"
 #include "server/store/store_health.h"
+#include "server/store/written_files.h"
 
 namespace wellspace::server {
 
@@ -34,6 +35,9 @@ struct DurableLogOptions {
 
   // Room that is kept for deletions, should the disk be full; 0: none.
   uint64_t ballast_bytes = 0;
+
+  // Files of points that are open at once until they are synchronised; more uploads end with DISK_FULL.
+  uint64_t max_written_files = 256;
 
   SessionTablesOptions tables{};                      // other ones: for tests
   uint64_t max_mesh_chunk_bytes = kMaxResponseBytes;  // other ones: for tests
@@ -83,7 +87,7 @@ class DurableLog final : public SessionLog {
   };
 
   DurableLog(const DurableLogOptions& options, std::unique_ptr<DataFolder> folder,
-             std::unique_ptr<SessionTables> tables);
+             std::unique_ptr<SessionTables> tables, std::unique_ptr<Folder> files_folder);
 
   absl::Status Enqueue(const SessionChange& change, Survives survives);
   std::vector<Waiting*> TakeBatch();
@@ -102,6 +106,7 @@ class DurableLog final : public SessionLog {
   const std::unique_ptr<DataFolder> folder_;
   const std::unique_ptr<SessionTables> tables_;
   const std::shared_ptr<FilesInUse> in_use_;
+  const std::shared_ptr<WrittenFiles> written_;
   const std::shared_ptr<ChunkBuffers> buffers_ = std::make_shared<ChunkBuffers>();
 
   std::mutex mutex_;

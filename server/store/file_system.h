@@ -33,6 +33,17 @@ class File {
   virtual absl::Status Synchronize() = 0;
 };
 
+// An open folder, whose names can be synchronised however many descriptors are in use.
+//
+// Thread safety: thread-safe.
+class Folder {
+ public:
+  virtual ~Folder() = default;
+
+  // As FileSystem::SynchronizeFolder.
+  virtual absl::Status Synchronize() = 0;
+};
+
 // A lock that is held as long as this lives, and as the process does.
 class FileLock {
  public:
@@ -59,6 +70,8 @@ class FileSystem {
   virtual absl::Status CreateFolder(const std::string& folder) = 0;
   // The names in the folder outlive a loss of power from now on.
   virtual absl::Status SynchronizeFolder(const std::string& folder) = 0;
+  // Where nothing is kept open: SynchronizeFolder by another name.
+  virtual absl::StatusOr<std::unique_ptr<Folder>> OpenFolder(const std::string& folder);
 
   // Locks the folder itself, whatever becomes of the names in it.
   //

@@ -17,14 +17,14 @@
 
 namespace wellspace::server {
 
-// Writes `mesh` to `path` by way of a file beside it, PATH.tmp: when it returns, the file outlives a loss of power. Its
-// chunks are cut for responses of at most `max_chunk_bytes`.
+// Writes `mesh` to `path`, in `folder`, by way of a file beside it, PATH.tmp: when it returns, the file outlives a loss
+// of power. Its chunks are cut for responses of at most `max_chunk_bytes`.
 //
 // Complexity: one pass over the mesh.
 // Errors:     DISK_FULL, STORE_FAILED; CANCELLED, DEADLINE_EXCEEDED. There is no file then, or one that garbage
 //             collection takes.
-absl::StatusOr<store::v1::MeshRecord> WriteMeshFile(FileSystem& files, StoreHealth& health, const std::string& path,
-                                                    uint64_t revision, const core::Mesh& mesh,
+absl::StatusOr<store::v1::MeshRecord> WriteMeshFile(FileSystem& files, Folder& folder, StoreHealth& health,
+                                                    const std::string& path, uint64_t revision, const core::Mesh& mesh,
                                                     const core::RunContext& context,
                                                     uint64_t max_chunk_bytes = kMaxResponseBytes);
 

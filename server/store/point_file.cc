@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
-#include <filesystem>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -24,9 +23,14 @@ absl::Status Damaged(const std::string& path, const std::string& what) {
 
 }  // namespace
 
-PointFile::PointFile(FileSystem& files, std::shared_ptr<StoreHealth> health, std::string path, int dimension,
-                     std::vector<store::v1::StepRecord::Points> committed, std::unique_ptr<FilesInUse::Use> use)
-    : files_(files), health_(std::move(health)), path_(std::move(path)), use_(std::move(use)) {
+PointFile::PointFile(FileSystem& files, std::shared_ptr<StoreHealth> health, std::shared_ptr<WrittenFiles> written,
+                     std::string path, int dimension, std::vector<store::v1::StepRecord::Points> committed,
+                     std::unique_ptr<FilesInUse::Use> use)
+    : files_(files),
+      health_(std::move(health)),
+      written_(std::move(written)),
+      path_(std::move(path)),
+      use_(std::move(use)) {
   for (const store::v1::StepRecord::Points& points : committed) {
     const uint64_t count = points.count() * dimension;
     pieces_.push_back({.first = committed_count_, .end = committed_count_ + count, .crc32c = points.crc32c()});
@@ -47,7 +51,7 @@ absl::StatusOr<std::shared_ptr<File>> PointFile::OpenToAppend() {
       mode = FileSystem::Mode::kCreateOrWrite;
     }
   }
-  auto opened = files_.Open(path_, mode);
+  auto opened = written_->Open(files_, path_, mode);
   if (!opened.ok()) {
     return opened.status().code() == absl::StatusCode::kNotFound ? Damaged(path_, "the file is missing")
                                                                  : health_->OfOpen(opened.status());
@@ -118,8 +122,7 @@ absl::Status PointFile::Synchronize() {
     return health_->Fail(synchronised);
   }
   if (has_new_name) {
-    const std::string folder = std::filesystem::path(path_).parent_path().string();
-    if (const absl::Status synchronised = files_.SynchronizeFolder(folder); !synchronised.ok()) {
+    if (const absl::Status synchronised = written_->folder().Synchronize(); !synchronised.ok()) {
       return health_->Fail(synchronised);
     }
   }

@@ -12,6 +12,7 @@
 #include "server/store/files_in_use.h"
 #include "server/store/point_store.h"
 #include "server/store/store_health.h"
+#include "server/store/written_files.h"
 #include "wellspace/store/v1/records.pb.h"
 
 namespace wellspace::server {
@@ -25,9 +26,11 @@ namespace wellspace::server {
 class PointFile final : public PointStore {
  public:
   // `committed`: one behind the other, from point 0 on; their checksums are looked at when they are first read. `use`
-  // lasts as long as this, and keeps the file; it may be null.
-  PointFile(FileSystem& files, std::shared_ptr<StoreHealth> health, std::string path, int dimension,
-            std::vector<store::v1::StepRecord::Points> committed, std::unique_ptr<FilesInUse::Use> use = nullptr);
+  // lasts as long as this, and keeps the file; it may be null. The file is in the folder of `written`; null: it is only
+  // read.
+  PointFile(FileSystem& files, std::shared_ptr<StoreHealth> health, std::shared_ptr<WrittenFiles> written,
+            std::string path, int dimension, std::vector<store::v1::StepRecord::Points> committed,
+            std::unique_ptr<FilesInUse::Use> use = nullptr);
 
   bool is_in_memory() const override { return false; }
   uint64_t coordinate_count() const override { return coordinate_count_; }
@@ -62,6 +65,7 @@ class PointFile final : public PointStore {
 
   FileSystem& files_;
   const std::shared_ptr<StoreHealth> health_;
+  const std::shared_ptr<WrittenFiles> written_;
   const std::string path_;
   const std::unique_ptr<FilesInUse::Use> use_;  // or null
   uint64_t committed_count_ = 0;                // coordinates, when this was opened

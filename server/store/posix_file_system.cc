@@ -144,6 +144,21 @@ class PosixFile final : public File {
   const Descriptor descriptor_;
 };
 
+class PosixFolder final : public Folder {
+ public:
+  PosixFolder(std::string path, int number) : path_(std::move(path)), descriptor_(number) {}
+
+  absl::Status Synchronize() override {
+    return Uninterrupted([&] { return ::fsync(descriptor_.number()); }) == 0
+               ? absl::OkStatus()
+               : SystemError(path_, "cannot be synchronised");
+  }
+
+ private:
+  const std::string path_;
+  const Descriptor descriptor_;
+};
+
 // The lock of flock, which goes with its descriptor.
 class PosixLock final : public FileLock {
  public:
@@ -228,13 +243,16 @@ class PosixFiles final : public FileSystem {
   }
 
   absl::Status SynchronizeFolder(const std::string& folder) override {
+    WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<Folder> opened, OpenFolder(folder));
+    return opened->Synchronize();
+  }
+
+  absl::StatusOr<std::unique_ptr<Folder>> OpenFolder(const std::string& folder) override {
     const int number = Uninterrupted([&] { return ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC); });
     if (number < 0) {
       return SystemError(folder, "cannot be opened");
     }
-    const Descriptor descriptor(number);
-    return Uninterrupted([&] { return ::fsync(number); }) == 0 ? absl::OkStatus()
-                                                               : SystemError(folder, "cannot be synchronised");
+    return std::make_unique<PosixFolder>(folder, number);
   }
 
   absl::StatusOr<std::unique_ptr<FileLock>> LockFolder(const std::string& folder) override {
@@ -271,7 +289,23 @@ class PosixFiles final : public FileSystem {
   }
 };
 
+// A folder that is opened whenever it is synchronised.
+class FolderByPath final : public Folder {
+ public:
+  FolderByPath(FileSystem& files, std::string path) : files_(files), path_(std::move(path)) {}
+
+  absl::Status Synchronize() override { return files_.SynchronizeFolder(path_); }
+
+ private:
+  FileSystem& files_;
+  const std::string path_;
+};
+
 }  // namespace
+
+absl::StatusOr<std::unique_ptr<Folder>> FileSystem::OpenFolder(const std::string& folder) {
+  return std::make_unique<FolderByPath>(*this, folder);
+}
 
 FileSystem& PosixFileSystem() {
   static PosixFiles files;

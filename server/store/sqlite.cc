@@ -11,7 +11,31 @@
 namespace wellspace::server {
 namespace {
 
-v1::ErrorReason ReasonOf(int code) {
+// Errors of the system for which nothing has been lost: no room for a file, or for a descriptor of one.
+bool IsForWantOfRoom(int error) {
+  return error == ENOSPC || error == EDQUOT || error == EFBIG || error == EMFILE || error == ENFILE;
+}
+
+// Whether a failure of this kind leaves what is on the disk known, unlike those to synchronise: SQLite takes the
+// transaction back, as when it is full, which is what it calls ENOSPC alone.
+bool IsOfWriteOrOpen(int code) {
+  switch (code) {
+    case SQLITE_IOERR_WRITE:
+    case SQLITE_IOERR_TRUNCATE:
+    case SQLITE_IOERR_SHMOPEN:
+    case SQLITE_IOERR_SHMSIZE:
+    case SQLITE_IOERR_SHMMAP:
+      return true;
+    default:
+      return (code & 0xff) == SQLITE_CANTOPEN;
+  }
+}
+
+// `error`: that of the system, or 0.
+v1::ErrorReason ReasonOf(int code, int error) {
+  if (IsOfWriteOrOpen(code) && IsForWantOfRoom(error)) {
+    return v1::ERROR_REASON_DISK_FULL;
+  }
   switch (code & 0xff) {  // the rest says more of it
     case SQLITE_FULL:
       return v1::ERROR_REASON_DISK_FULL;
@@ -35,6 +59,9 @@ v1::ErrorReason ReasonOf(int code) {
 std::string ExplanationOf(int code, int error, const char* words) {
   if ((code & 0xff) == SQLITE_CANTOPEN && error == ENOENT) {
     return "the database is missing";
+  }
+  if (IsOfWriteOrOpen(code) && IsForWantOfRoom(error)) {
+    return "the server has no room to write this down";
   }
   switch (code & 0xff) {
     case SQLITE_FULL:
@@ -82,17 +109,23 @@ absl::StatusOr<std::unique_ptr<SqliteDatabase>> SqliteDatabase::Open(const std::
 SqliteDatabase::~SqliteDatabase() { sqlite3_close_v2(handle_); }
 
 absl::Status SqliteDatabase::ErrorOf(int code) const {
-  const v1::ErrorReason reason = ReasonOf(code);
-  const int error = sqlite3_system_errno(handle_);
+  const int last_error = errno;
+  // Of a commit SQLite does not note it; then it is what the thread's last call of the system has left.
+  const int noted = sqlite3_system_errno(handle_);
+  const int error = noted == 0 && IsOfWriteOrOpen(code) ? last_error : noted;
+  const v1::ErrorReason reason = ReasonOf(code, error);
   std::string message =
       absl::StrCat(path_, ": ", ExplanationOf(code, error, sqlite3_errmsg(handle_)), " (SQLite ", code);
   absl::StrAppend(&message,
-                  reason == v1::ERROR_REASON_STORE_FAILED && error != 0 ? absl::StrCat(": ", std::strerror(error)) : "",
+                  (reason == v1::ERROR_REASON_STORE_FAILED || IsOfWriteOrOpen(code)) && error != 0
+                      ? absl::StrCat(": ", std::strerror(error))
+                      : "",
                   ")");
   return MakeError(reason, message);
 }
 
 absl::Status SqliteDatabase::Execute(const std::string& statements) {
+  errno = 0;
   const int code = sqlite3_exec(handle_, statements.c_str(), nullptr, nullptr, nullptr);
   return code == SQLITE_OK ? absl::OkStatus() : ErrorOf(code);
 }
@@ -135,6 +168,7 @@ void SqliteStatement::BindOne(int place, Blob blob) {
 }
 
 absl::StatusOr<bool> SqliteStatement::Step() {
+  errno = 0;
   const int code = bind_error_ == SQLITE_OK ? sqlite3_step(statement_.get()) : bind_error_;
   if (code == SQLITE_ROW || code == SQLITE_DONE) {
     return code == SQLITE_ROW;

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <filesystem>
 #include <span>
 #include <string>
 #include <utility>
@@ -96,8 +95,8 @@ absl::Status WriteAll(File& file, const core::Mesh& mesh, const core::RunContext
 
 }  // namespace
 
-absl::StatusOr<store::v1::MeshRecord> WriteMeshFile(FileSystem& files, StoreHealth& health, const std::string& path,
-                                                    uint64_t revision, const core::Mesh& mesh,
+absl::StatusOr<store::v1::MeshRecord> WriteMeshFile(FileSystem& files, Folder& folder, StoreHealth& health,
+                                                    const std::string& path, uint64_t revision, const core::Mesh& mesh,
                                                     const core::RunContext& context, uint64_t max_chunk_bytes) {
   WELLSPACE_RETURN_IF_ERROR(health.CheckRoom());
   const std::string temporary = path + std::string(kTemporaryEnd);
@@ -117,8 +116,7 @@ absl::StatusOr<store::v1::MeshRecord> WriteMeshFile(FileSystem& files, StoreHeal
     files.Remove(temporary).IgnoreError();
     return stopped.ok() ? health.OfWrite(written) : stopped;
   }
-  if (const absl::Status named = files.SynchronizeFolder(std::filesystem::path(path).parent_path().string());
-      !named.ok()) {
+  if (const absl::Status named = folder.Synchronize(); !named.ok()) {
     return health.Fail(named);
   }
   return record;

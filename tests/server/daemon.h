@@ -28,9 +28,10 @@ inline absl::Status MeshTriangle(client::Client client) {
 // A wellspaced on a free port.
 class Daemon {
  public:
-  // Its standard error is the test's, or goes to the file `error_path`.
-  explicit Daemon(std::vector<std::string> arguments = {}, const std::string& error_path = "")
-      : process_("wellspaced", Listening(std::move(arguments)), error_path) {
+  // Its standard error is the test's, or goes to the file `error_path`. `limits`: see Subprocess.
+  explicit Daemon(std::vector<std::string> arguments = {}, const std::string& error_path = "",
+                  const std::string& limits = "")
+      : process_("wellspaced", Listening(std::move(arguments)), error_path, limits) {
     const std::string line = process_.ReadLine();
     const std::string prefix = "listening on ";
     EXPECT_EQ(line.substr(0, prefix.size()), prefix);

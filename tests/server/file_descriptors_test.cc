@@ -5,6 +5,8 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <filesystem>
 #include <fstream>
 #include <memory>
 #include <string>
@@ -14,39 +16,28 @@
 #include "absl/time/clock.h"
 #include "client/client.h"
 #include "gmock/gmock.h"
+#include "grpcpp/grpcpp.h"
 #include "gtest/gtest.h"
+#include "server/base/descriptor_limit.h"
 #include "tests/server/daemon.h"
 #include "tests/server/raw_http2.h"
+#include "tests/server/service_harness.h"
+#include "tests/server/session_calls.h"
 #include "tests/support/temporary_folder.h"
 
 namespace wellspace::server {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr rlim_t kDescriptors = 64;
-
-// A limit on descriptors for the programs that are started while it lasts.
-class ScopedDescriptorLimit {
- public:
-  explicit ScopedDescriptorLimit(rlim_t limit) {
-    getrlimit(RLIMIT_NOFILE, &before_);
-    const rlimit lower = {.rlim_cur = limit, .rlim_max = before_.rlim_max};
-    EXPECT_EQ(setrlimit(RLIMIT_NOFILE, &lower), 0);
-  }
-  ~ScopedDescriptorLimit() { setrlimit(RLIMIT_NOFILE, &before_); }
-  ScopedDescriptorLimit(const ScopedDescriptorLimit&) = delete;
-  ScopedDescriptorLimit& operator=(const ScopedDescriptorLimit&) = delete;
-
- private:
-  rlimit before_ = {};
-};
 
 class FileDescriptors : public ::testing::Test {
  protected:
   FileDescriptors() {
-    const ScopedDescriptorLimit limit(kDescriptors);
-    daemon_ = std::make_unique<Daemon>(std::vector<std::string>(), folder_.Path("log"));
+    daemon_ = std::make_unique<Daemon>(std::vector<std::string>(), folder_.Path("log"),
+                                       absl::StrCat("ulimit -n ", kDescriptors));
   }
 
   ~FileDescriptors() override {
@@ -139,6 +130,108 @@ TEST_F(FileDescriptors, NoneAtAllMakeConnectionsWait) {
   ASSERT_EQ(prlimit(pid(), RLIMIT_NOFILE, &some, nullptr), 0);
   EXPECT_TRUE(waiting.IsAlive());
   EXPECT_EQ(MeshFromAnotherProcess(), 0);
+}
+
+// What the system gives for the asking.
+TEST(DescriptorLimit, IsRaisedAtTheStart) {
+  Daemon daemon({}, "", "ulimit -Sn 100; ulimit -Hn 300");
+  rlimit limit = {};
+  ASSERT_EQ(prlimit(daemon.process().pid(), RLIMIT_NOFILE, nullptr, &limit), 0);
+  EXPECT_EQ(limit.rlim_cur, 300u);
+  daemon.Stop();
+}
+
+TEST(DescriptorLimit, LeavesSomeForFiles) {
+  for (const uint64_t limit : {0, 4, 64, 96, 1024, 65536}) {
+    EXPECT_EQ(SpareDescriptors(limit, /*keeps_files=*/false), std::min<uint64_t>(limit / 4, 24)) << limit;
+  }
+  EXPECT_EQ(SpareDescriptors(64, /*keeps_files=*/true), 32u);
+  EXPECT_EQ(SpareDescriptors(512, /*keeps_files=*/true), 256u);
+  EXPECT_EQ(SpareDescriptors(1024, /*keeps_files=*/true), 256u);
+  EXPECT_EQ(SpareDescriptors(4096, /*keeps_files=*/true), 1024u);
+  for (const uint64_t limit : {0, 1, 64, 1024, 65536}) {
+    EXPECT_GE(MaxWrittenFiles(limit), 1u) << limit;
+    EXPECT_LE(MaxWrittenFiles(limit), std::max<uint64_t>(SpareDescriptors(limit, true), 1)) << limit;
+  }
+}
+
+// An upload that has sent its points and does not end them yet.
+class OpenUpload {
+ public:
+  OpenUpload(v1::SessionService::Stub& sessions, const std::string& name)
+      : stream_(sessions.UploadPoints(&context_, &response_)) {
+    stream_->Write(UploadRequest(name, 0, UniformPoints(kPoints, 3, 1)));
+  }
+
+  static constexpr size_t kPoints = 100;
+
+  grpc::Status Finish() {
+    stream_->WritesDone();
+    return stream_->Finish();
+  }
+  uint64_t committed() const { return response_.committed_points(); }
+
+ private:
+  grpc::ClientContext context_;
+  v1::UploadPointsResponse response_;
+  std::unique_ptr<grpc::ClientWriter<v1::UploadPointsRequest>> stream_;
+};
+
+// A durable server, connections that say nothing, as many as it takes, and uploads, more than it opens files for.
+TEST(DurableFileDescriptors, UsedUpByConnectionsAndUploadsLoseNothing) {
+  constexpr uint64_t kLimit = 256;
+  constexpr int kUploads = 100;
+  const TemporaryFolder folder;
+  Daemon daemon({"--data", folder.Path("data"), "--max-sessions-per-tenant", "1000"}, folder.Path("log"),
+                absl::StrCat("ulimit -n ", kLimit));
+  const client::Client first = daemon.Client();
+  ASSERT_EQ(MeshTriangle(first), absl::OkStatus());
+  SessionCalls calls(grpc::CreateChannel(daemon.address(), grpc::InsecureChannelCredentials()));
+  std::vector<std::string> names;
+  for (int i = 0; i < kUploads; ++i) {
+    names.push_back(calls.Create().name());
+  }
+  std::vector<RawConnection> silent;
+  for (uint64_t i = 0; i < 2 * kLimit; ++i) {
+    silent.emplace_back(daemon.address());
+  }
+  EXPECT_TRUE(silent.back().IsClosedByServer());
+
+  std::vector<std::unique_ptr<OpenUpload>> uploads;
+  for (const std::string& name : names) {
+    uploads.push_back(std::make_unique<OpenUpload>(calls.sessions(), name));
+  }
+  uint64_t served = 0;
+  for (const std::unique_ptr<OpenUpload>& upload : uploads) {
+    const grpc::Status status = upload->Finish();
+    const bool is_served = status.ok() && upload->committed() == OpenUpload::kPoints;
+    served += is_served ? 1 : 0;
+    EXPECT_TRUE(is_served || DetailsOf(status).reason == "DISK_FULL") << status.error_message();
+  }
+  EXPECT_GE(served, MaxWrittenFiles(kLimit));
+  // The others go on, and the server as well.
+  for (const std::string& name : names) {
+    EXPECT_EQ(calls.Upload(name, 0, UniformPoints(OpenUpload::kPoints, 3, 1)).committed_points(), OpenUpload::kPoints);
+  }
+  EXPECT_EQ(MeshTriangle(first), absl::OkStatus());
+  daemon.Stop();
+  EXPECT_THAT(folder.Read("log"), Not(HasSubstr("store_failed")));
+}
+
+// A file that must not grow further is a full disk: its server reads on, and says so.
+TEST(DurableFileDescriptors, AFileThatMustNotGrowIsAFullDisk) {
+  const TemporaryFolder folder;
+  Daemon daemon({"--data", folder.Path("data")}, folder.Path("log"), "ulimit -f 2048");  // blocks of 512 bytes
+  SessionCalls calls(grpc::CreateChannel(daemon.address(), grpc::InsecureChannelCredentials()));
+  const std::string name = calls.Create().name();
+  const std::vector<double> points = UniformPoints(50'000, 3, 1);  // 1.2 MB
+  grpc::Status status;
+  calls.Upload(name, 0, points, &status);
+  EXPECT_EQ(DetailsOf(status).reason, "DISK_FULL") << status.error_message();
+  EXPECT_EQ(calls.Get(name).committed_points(), 0u);
+  EXPECT_EQ(calls.Upload(name, 0, UniformPoints(10, 3, 1)).committed_points(), 10u);
+  daemon.Stop();
+  EXPECT_THAT(folder.Read("log"), Not(HasSubstr("store_failed")));
 }
 
 }  // namespace

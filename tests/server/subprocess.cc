@@ -15,13 +15,18 @@ extern char** environ;
 
 namespace wellspace::server {
 
-Subprocess::Subprocess(const std::string& name, std::vector<std::string> arguments, const std::string& error_path) {
+Subprocess::Subprocess(const std::string& name, std::vector<std::string> arguments, const std::string& error_path,
+                       const std::string& limits) {
   const char* folder = std::getenv("WELLSPACE_BIN_DIR");
   if (folder == nullptr) {
     throw std::runtime_error("WELLSPACE_BIN_DIR is not set: run this test with ctest");
   }
-  std::string program = std::string(folder) + "/" + name;
-  std::vector<char*> argv = {program.data()};
+  arguments.insert(arguments.begin(), std::string(folder) + "/" + name);
+  if (!limits.empty()) {
+    arguments.insert(arguments.begin(), {"/bin/sh", "-c", limits + R"(; exec "$0" "$@")"});
+  }
+  const std::string program = arguments.front();
+  std::vector<char*> argv;
   for (std::string& argument : arguments) {
     argv.push_back(argument.data());
   }

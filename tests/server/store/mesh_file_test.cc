@@ -20,7 +20,8 @@ class MeshFileTest : public ::testing::Test {
  protected:
   std::shared_ptr<MeshFile> Keep(const core::Mesh& mesh, uint64_t max_chunk_bytes = kMaxResponseBytes) {
     auto use = in_use_->Take(path_, /*is_written=*/true);
-    const auto record = WriteMeshFile(PosixFileSystem(), health_, path_, 5, mesh, core::RunContext(), max_chunk_bytes);
+    const auto record =
+        WriteMeshFile(PosixFileSystem(), *written_, health_, path_, 5, mesh, core::RunContext(), max_chunk_bytes);
     EXPECT_TRUE(record.ok()) << record.status();
     return std::make_shared<MeshFile>(PosixFileSystem(), *record, std::move(use));
   }
@@ -32,6 +33,7 @@ class MeshFileTest : public ::testing::Test {
 
   const TestFolder folder_;
   const std::string path_ = folder_.path() + "/a.mesh-5";
+  const std::unique_ptr<Folder> written_ = *PosixFileSystem().OpenFolder(folder_.path());
   StoreHealth health_{nullptr};
   const std::shared_ptr<FilesInUse> in_use_ = std::make_shared<FilesInUse>(PosixFileSystem());
 };
@@ -211,7 +213,7 @@ TEST_F(MeshFileTest, WritingAndLoadingCanBeCancelled) {
   core::RunContext cancelled;
   cancelled.Cancel();
   const core::Mesh mesh = MakeMesh({});
-  EXPECT_EQ(WriteMeshFile(PosixFileSystem(), health_, path_, 5, mesh, cancelled).status().code(),
+  EXPECT_EQ(WriteMeshFile(PosixFileSystem(), *written_, health_, path_, 5, mesh, cancelled).status().code(),
             absl::StatusCode::kCancelled);
   EXPECT_TRUE(std::filesystem::is_empty(folder_.path()));
   EXPECT_TRUE(health_.Check().ok());

@@ -22,6 +22,8 @@ using ::testing::HasSubstr;
 
 class PointFileTest : public ::testing::Test {
  protected:
+  static constexpr uint64_t kPlaces = 2;
+
   PointFileTest() {
     std::iota(all_.begin(), all_.end(), 0.0);
     all_[0] = -0.0;
@@ -29,7 +31,7 @@ class PointFileTest : public ::testing::Test {
   }
 
   std::unique_ptr<PointFile> Open(std::vector<store::v1::StepRecord::Points> committed = {}) {
-    return std::make_unique<PointFile>(PosixFileSystem(), health_, path_, 2, std::move(committed));
+    return std::make_unique<PointFile>(PosixFileSystem(), health_, written_, path_, 2, std::move(committed));
   }
 
   // Two pieces: the first 200 000 coordinates, and the next 100 000.
@@ -51,6 +53,8 @@ class PointFileTest : public ::testing::Test {
   std::vector<absl::Status> failures_;
   const std::shared_ptr<StoreHealth> health_ =
       std::make_shared<StoreHealth>([this](const absl::Status& cause) { failures_.push_back(cause); });
+  const std::shared_ptr<WrittenFiles> written_ =
+      std::make_shared<WrittenFiles>(*PosixFileSystem().OpenFolder(folder_.path()), kPlaces);
   std::vector<double> all_ = std::vector<double>(500'000);
   const core::RunContext context_;
 };
@@ -74,6 +78,28 @@ TEST_F(PointFileTest, GivesBackWhatCameInAnyPieces) {
     EXPECT_TRUE(std::equal(copy->begin(), copy->end(), all_.begin() + static_cast<std::ptrdiff_t>(first), all_.end()));
     EXPECT_EQ(*file->Checksum(first, all_.size()), Crc32c(all_.data() + first, (all_.size() - first) * sizeof(double)));
   }
+}
+
+// Each keeps its descriptor until it is synchronised.
+TEST_F(PointFileTest, NoMoreAreOpenThanThereArePlaces) {
+  std::vector<std::unique_ptr<PointFile>> files;
+  for (uint64_t i = 0; i <= kPlaces; ++i) {
+    files.push_back(std::make_unique<PointFile>(PosixFileSystem(), health_, written_, path_ + std::to_string(i), 2,
+                                                std::vector<store::v1::StepRecord::Points>()));
+  }
+  const std::vector<double> points(10);
+  for (uint64_t i = 0; i < kPlaces; ++i) {
+    ASSERT_TRUE(files[i]->Append(points).ok()) << i;
+  }
+  const absl::Status refused = files[kPlaces]->Append(points);
+  EXPECT_EQ(ReasonOf(refused), "DISK_FULL") << refused;
+  EXPECT_EQ(files[kPlaces]->coordinate_count(), 0u);
+  ASSERT_TRUE(files[0]->Append(points).ok()) << "it has a place";
+  ASSERT_TRUE(files[0]->Synchronize().ok());
+  EXPECT_TRUE(files[kPlaces]->Append(points).ok());
+  files.pop_back();
+  EXPECT_TRUE(files[0]->Append(points).ok());
+  EXPECT_TRUE(failures_.empty());
 }
 
 TEST_F(PointFileTest, ComparesBitByBit) {
