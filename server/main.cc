@@ -95,7 +95,8 @@ void Declare(CLI::App& app, Flags& flags) {
       ->check(CLI::IsMember({"text", "json"}))
       ->capture_default_str();
   app.add_option("--metrics-listen", flags.server.observability.metrics_listen,
-                 "Address of an HTTP listener with /metrics for Prometheus; default: none")
+                 "Address of an HTTP listener with /metrics for Prometheus, and the probes /livez and /readyz; "
+                 "default: none")
       ->type_name("HOST:PORT");
   app.add_option("--admin-listen", flags.server.observability.admin_listen,
                  "Address, on the loopback, of a gRPC listener with channelz; default: none")

@@ -101,6 +101,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& optio
   const bool keeps_files = session_log->is_durable();
   std::unique_ptr<Server> server(new Server(options, std::move(security), std::move(log), std::move(session_log),
                                             std::move(mesher), std::move(estimator), std::move(create_mesher)));
+  WELLSPACE_RETURN_IF_ERROR(server->observability_.ListenForHttp(options.observability));
   WELLSPACE_RETURN_IF_ERROR(server->backend_.Restore());
   const std::array<grpc::Service*, 4> services = {&server->meshing_, &server->sessions_, &server->operations_,
                                                   &server->queries_};
@@ -115,12 +116,13 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& optio
   for (const std::string& service : ServiceNames()) {
     server->server_->GetHealthCheckService()->SetServingStatus(service, true);
   }
-  WELLSPACE_RETURN_IF_ERROR(server->observability_.Listen(options.observability));
+  WELLSPACE_RETURN_IF_ERROR(server->observability_.ListenForAdmin(options.observability));
   if (listener != nullptr) {
     server->address_ = address.ToString();
     server->listener_ = std::move(listener);
     server->listener_->Start(std::move(acceptor), server->connections_, keeps_files);
   }
+  server->observability_.SetReadiness(Readiness::kServing);
   return server;
 }
 
@@ -167,6 +169,7 @@ void Server::Shutdown(absl::Duration grace) {
     return;
   }
   std::call_once(shut_down_, [this, grace] {
+    observability_.SetReadiness(Readiness::kStopping);
     server_->GetHealthCheckService()->SetServingStatus(false);
     backend_.calls().Close();
     const absl::Duration end = SinceBoot() + grace;

@@ -51,7 +51,7 @@ class Server {
   // EphemeralLog. Tests put other work in the place of the core's.
   //
   // Errors:     INVALID_ARGUMENT (listen), those of Security::Load and AddAcceptor, of Listener::Open, of
-  //             Observability::Listen and of Backend::Restore.
+  //             Observability::ListenForHttp and ListenForAdmin, and of Backend::Restore.
   static absl::StatusOr<std::unique_ptr<Server>> Start(const ServerOptions& options,
                                                        std::shared_ptr<spdlog::logger> log,
                                                        std::unique_ptr<SessionLog> session_log = nullptr,

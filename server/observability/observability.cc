@@ -1,9 +1,10 @@
 #include "server/observability/observability.h"
 
-#include <atomic>
+#include <iterator>
 #include <utility>
 
 #include "core/base/status_macros.h"
+#include "prometheus/text_serializer.h"
 #include "server/network/connections.h"
 
 namespace wellspace::server {
@@ -13,6 +14,27 @@ namespace {
 std::vector<std::string> AndThoseOfGrpc(std::vector<std::string> services) {
   services.insert(services.end(), {"grpc.reflection.v1alpha.ServerReflection", "grpc.channelz.v1.Channelz"});
   return services;
+}
+
+HttpAnswer MetricsAnswer(const Metrics& metrics) {
+  std::vector<prometheus::MetricFamily> families;
+  for (const std::shared_ptr<prometheus::Collectable>& collectable : metrics.Collectables()) {
+    std::vector<prometheus::MetricFamily> some = collectable->Collect();
+    std::move(some.begin(), some.end(), std::back_inserter(families));
+  }
+  return {.type = "text/plain; version=0.0.4; charset=utf-8", .body = prometheus::TextSerializer().Serialize(families)};
+}
+
+HttpAnswer ReadinessAnswer(Readiness readiness) {
+  switch (readiness) {
+    case Readiness::kServing:
+      return {.body = "ready\n"};
+    case Readiness::kRestoring:
+      return {.status = "503 Service Unavailable", .body = "restoring sessions\n"};
+    case Readiness::kStopping:
+      break;
+  }
+  return {.status = "503 Service Unavailable", .body = "stopping\n"};
 }
 
 }  // namespace
@@ -52,10 +74,19 @@ void Observability::Watch(grpc::ServerBuilder& builder) {
   LeaveOutChannelz(builder);
 }
 
-absl::Status Observability::Listen(const ObservabilityOptions& options) {
-  if (!options.metrics_listen.empty()) {
-    WELLSPACE_ASSIGN_OR_RETURN(endpoint_, MetricsEndpoint::Start(options.metrics_listen, metrics_));
+absl::Status Observability::ListenForHttp(const ObservabilityOptions& options) {
+  if (options.metrics_listen.empty()) {
+    return absl::OkStatus();
   }
+  HttpRoutes routes;
+  routes["/metrics"] = [this] { return MetricsAnswer(metrics_); };
+  routes["/livez"] = [] { return HttpAnswer{.body = "alive\n"}; };
+  routes["/readyz"] = [this] { return ReadinessAnswer(readiness_); };
+  WELLSPACE_ASSIGN_OR_RETURN(endpoint_, HttpEndpoint::Start(options.metrics_listen, std::move(routes)));
+  return absl::OkStatus();
+}
+
+absl::Status Observability::ListenForAdmin(const ObservabilityOptions& options) {
   if (!options.admin_listen.empty()) {
     WELLSPACE_ASSIGN_OR_RETURN(admin_, AdminServer::Start(options.admin_listen, calls_));
   }

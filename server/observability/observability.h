@@ -2,17 +2,18 @@
 #ifndef WELLSPACE_SERVER_OBSERVABILITY_OBSERVABILITY_H_
 #define WELLSPACE_SERVER_OBSERVABILITY_OBSERVABILITY_H_
 
+#include <atomic>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "grpcpp/server_builder.h"
+#include "server/network/http_endpoint.h"
 #include "server/observability/admin_server.h"
 #include "server/observability/call_metrics.h"
 #include "server/observability/call_observer.h"
 #include "server/observability/metrics.h"
-#include "server/observability/metrics_endpoint.h"
 #include "server/observability/work_counters.h"
 #include "server/observability/work_observer.h"
 #include "spdlog/logger.h"
@@ -23,9 +24,12 @@ class Connections;
 
 // Each HOST:PORT, port 0 takes a free one; empty: not served.
 struct ObservabilityOptions {
-  std::string metrics_listen;  // HTTP, GET /metrics
+  std::string metrics_listen;  // HTTP: /metrics, /livez, /readyz
   std::string admin_listen;    // gRPC, channelz; the loopback only
 };
+
+// Whether a server takes calls; what /readyz says.
+enum class Readiness { kRestoring, kServing, kStopping };
 
 // Thread safety: thread-safe.
 class Observability {
@@ -44,10 +48,20 @@ class Observability {
   // Has the server of `builder` watched, and serve no channelz to its users.
   void Watch(grpc::ServerBuilder& builder);
 
-  // To be called once, when metrics() is complete. What it starts runs until Stop.
+  // Serves /metrics, /livez and /readyz. To be called once, when metrics() is complete; runs until Stop. It may be
+  // called while sessions are restored, so that probes see a server that is alive and not ready.
   //
-  // Errors:     those of MetricsEndpoint::Start and AdminServer::Start.
-  absl::Status Listen(const ObservabilityOptions& options);
+  // Errors:     those of HttpEndpoint::Start.
+  absl::Status ListenForHttp(const ObservabilityOptions& options);
+
+  // Serves channelz. To be called once, after the server has been started; runs until Stop.
+  //
+  // Errors:     those of AdminServer::Start.
+  absl::Status ListenForAdmin(const ObservabilityOptions& options);
+
+  // What /readyz says from now on. A server begins with kRestoring.
+  void SetReadiness(Readiness readiness) { readiness_ = readiness; }
+
   // HOST:PORT with the port in use; empty: not served.
   std::string metrics_address() const { return endpoint_ == nullptr ? "" : endpoint_->address(); }
   std::string admin_address() const { return admin_ == nullptr ? "" : admin_->address(); }
@@ -63,7 +77,8 @@ class Observability {
   CallObserver calls_;
   WorkCounters work_;
   WorkObserver work_observer_;
-  std::unique_ptr<MetricsEndpoint> endpoint_;
+  std::atomic<Readiness> readiness_ = Readiness::kRestoring;
+  std::unique_ptr<HttpEndpoint> endpoint_;
   std::unique_ptr<AdminServer> admin_;
 };
 

@@ -4,16 +4,21 @@
 #include <algorithm>
 #include <memory>
 #include <regex>
+#include <span>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include "gmock/gmock.h"
 #include "grpcpp/generic/generic_stub.h"
 #include "gtest/gtest.h"
 #include "prometheus/text_serializer.h"
+#include "server/server.h"
+#include "server/store/ephemeral_log.h"
 #include "tests/server/http_get.h"
 #include "tests/server/raw_call.h"
 #include "tests/server/service_harness.h"
@@ -293,7 +298,7 @@ TEST(Channelz, IsRefusedWhereOtherMachinesCouldSeeIt) {
   EXPECT_THAT(status.message(), AllOf(HasSubstr("0.0.0.0:0"), HasSubstr("127.0.0.1")));
 }
 
-TEST(MetricsEndpoint, SaysWhyItCannotListen) {
+TEST(HttpListener, SaysWhyItCannotListen) {
   const auto start = [](const std::string& listen) {
     ServerOptions options;
     options.observability.metrics_listen = listen;
@@ -328,39 +333,88 @@ TEST_F(MetricsEndpointTest, ServesMetricsAndNothingElse) {
   EXPECT_THAT(response, StartsWith("HTTP/1.1 200 OK\r\n"));
   EXPECT_THAT(response, HasSubstr("\r\nContent-Type: text/plain; version=0.0.4"));
   EXPECT_THAT(response, HasSubstr("\nwellspace_calls_in_flight 0\n"));
-  EXPECT_THAT(HttpGet(address(), "/metrics?name=x"), StartsWith("HTTP/1.1 200 OK\r\n"));
   EXPECT_THAT(HttpGet(address(), "/"), StartsWith("HTTP/1.1 404 "));
-  EXPECT_THAT(HttpGet(address(), "/metricsx"), StartsWith("HTTP/1.1 404 "));
-  const auto answer_to = [this](const std::string& bytes) {
-    const int socket = SendHttp(address(), bytes);
-    std::string answer = ReadHttp(socket);
-    close(socket);
-    return answer;
-  };
-  EXPECT_THAT(answer_to("POST /metrics HTTP/1.1\r\n\r\n"), StartsWith("HTTP/1.1 405 "));
-  EXPECT_THAT(answer_to("nonsense\r\n\r\n"), StartsWith("HTTP/1.1 400 "));
-  EXPECT_THAT(answer_to("GET /metrics\r\n\r\n"), StartsWith("HTTP/1.1 400 "));
-  EXPECT_THAT(answer_to(std::string(9000, 'x')), StartsWith("HTTP/1.1 431 "));
-  const std::string head = answer_to("HEAD /metrics HTTP/1.1\r\n\r\n");
-  EXPECT_THAT(head, StartsWith("HTTP/1.1 200 OK\r\n"));
-  EXPECT_THAT(head, EndsWith("\r\n\r\n"));
 }
 
-// As many as would have held every thread of a server that has one for each.
-TEST_F(MetricsEndpointTest, IsNotHeldUpByRequestsThatNeverComeWhole) {
-  constexpr int kSlow = 200;
-  std::vector<int> slow;
-  for (int i = 0; i < kSlow; ++i) {
-    slow.push_back(SendHttp(address(), "GET /metrics HTTP/1.1\r\nHost: loc"));
+TEST_F(MetricsEndpointTest, IsAliveAndReadyWhileItServes) {
+  EXPECT_THAT(HttpGet(address(), "/livez"), AllOf(StartsWith("HTTP/1.1 200 OK\r\n"), EndsWith("\r\n\r\nalive\n")));
+  EXPECT_THAT(HttpGet(address(), "/readyz"), AllOf(StartsWith("HTTP/1.1 200 OK\r\n"), EndsWith("\r\n\r\nready\n")));
+}
+
+// A log whose sessions come when the test says so.
+class SlowLog final : public EphemeralLog {
+ public:
+  SlowLog(Event& asked, Event& go_on) : asked_(asked), go_on_(go_on) {}
+
+  absl::StatusOr<StoredSessions> Load() override {
+    asked_.Set();
+    EXPECT_TRUE(go_on_.Wait());
+    return EphemeralLog::Load();
   }
-  const absl::Time begin = absl::Now();
-  EXPECT_THAT(HttpGet(address(), "/metrics"), StartsWith("HTTP/1.1 200 OK\r\n"));
-  EXPECT_LT(absl::Now() - begin, absl::Seconds(2));
-  // The oldest had to go, the others go when their time is up.
-  for (const int socket : slow) {
-    EXPECT_EQ(ReadHttp(socket), "");
-    close(socket);
-  }
+
+ private:
+  Event& asked_;
+  Event& go_on_;
+};
+
+// A port that was free a moment ago.
+std::string FreeAddress() {
+  ServerOptions options;
+  options.observability.metrics_listen = "127.0.0.1:0";
+  return (*Server::Start(options, std::make_shared<spdlog::logger>("none")))->observability().metrics_address();
+}
+
+TEST(Probes, AServerThatRestoresIsAliveAndNotReady) {
+  ServerOptions options;
+  options.observability.metrics_listen = FreeAddress();
+  Event asked;
+  Event go_on;
+  absl::StatusOr<std::unique_ptr<Server>> server = absl::UnknownError("not started");
+  std::thread starter([&] {
+    server = Server::Start(options, std::make_shared<spdlog::logger>("none"), std::make_unique<SlowLog>(asked, go_on));
+  });
+  EXPECT_TRUE(asked.Wait());
+  const std::string& address = options.observability.metrics_listen;
+  EXPECT_THAT(HttpGet(address, "/livez"), StartsWith("HTTP/1.1 200 OK\r\n"));
+  EXPECT_THAT(HttpGet(address, "/readyz"), AllOf(StartsWith("HTTP/1.1 503 "), HasSubstr("restoring sessions")));
+  EXPECT_THAT(HttpGet(address, "/metrics"), HasSubstr("\nwellspace_sessions 0\n"));
+  go_on.Set();
+  starter.join();
+  ASSERT_TRUE(server.ok()) << server.status();
+  EXPECT_THAT(HttpGet(address, "/readyz"), StartsWith("HTTP/1.1 200 OK\r\n"));
+}
+
+TEST(Probes, AServerThatStopsIsAliveAndNotReadyAtOnce) {
+  Event started;
+  Event go_on;
+  ServerOptions options;
+  options.observability.metrics_listen = "127.0.0.1:0";
+  const absl::StatusOr<std::unique_ptr<Server>> server =
+      Server::Start(options, std::make_shared<spdlog::logger>("none"), nullptr,
+                    [&](const core::MeshParameters& parameters, std::span<const double> points, core::RunContext&) {
+                      started.Set();
+                      EXPECT_TRUE(go_on.Wait());
+                      return MakeFakeMesh(parameters, points);
+                    });
+  ASSERT_TRUE(server.ok()) << server.status();
+  const absl::StatusOr<std::shared_ptr<grpc::Channel>> channel = (*server)->InProcessChannel();
+  ASSERT_TRUE(channel.ok()) << channel.status();
+  const std::unique_ptr<v1::MeshingService::Stub> stub = v1::MeshingService::NewStub(*channel);
+  TestCall call(*stub);
+  call.Send(UnitCubeParameters());
+  call.HalfClose();
+  ASSERT_TRUE(started.Wait());
+  std::thread stopper([&server] { (*server)->Shutdown(absl::Minutes(5)); });
+  const std::string address = (*server)->observability().metrics_address();
+  std::string ready;
+  do {  // the thread that stops it has to be scheduled first; the call holds the server until then
+    ready = HttpGet(address, "/readyz");
+  } while (absl::StartsWith(ready, "HTTP/1.1 200 "));
+  EXPECT_THAT(ready, AllOf(StartsWith("HTTP/1.1 503 "), HasSubstr("stopping")));
+  EXPECT_THAT(HttpGet(address, "/livez"), StartsWith("HTTP/1.1 200 OK\r\n"));
+  go_on.Set();
+  EXPECT_TRUE(call.Finish().ok());
+  stopper.join();
 }
 
 }  // namespace

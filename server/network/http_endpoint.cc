@@ -1,4 +1,4 @@
-#include "server/observability/metrics_endpoint.h"
+#include "server/network/http_endpoint.h"
 
 #include <errno.h>
 #include <poll.h>
@@ -6,12 +6,10 @@
 #include <sys/socket.h>
 
 #include <algorithm>
-#include <iterator>
 #include <string_view>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
-#include "prometheus/text_serializer.h"
 #include "server/network/listen_address.h"
 #include "server/network/listening_sockets.h"
 
@@ -21,49 +19,46 @@ namespace {
 // How often clients that take too long are looked for.
 constexpr int kClientLookMs = 500;
 
-std::string Response(std::string_view status, std::string_view type, std::string_view body) {
-  return absl::StrCat("HTTP/1.1 ", std::string(status), "\r\nContent-Type: ", std::string(type),
-                      "\r\nContent-Length: ", body.size(), "\r\nConnection: close\r\n\r\n", std::string(body));
+std::string Response(const HttpAnswer& answer) {
+  return absl::StrCat("HTTP/1.1 ", answer.status, "\r\nContent-Type: ", answer.type,
+                      "\r\nContent-Length: ", answer.body.size(), "\r\nConnection: close\r\n\r\n", answer.body);
 }
 
-std::string RefusalResponse(std::string_view status) {
-  return Response(status, "text/plain", absl::StrCat(std::string(status), "\n"));
-}
+std::string Refusal(const std::string& status) { return Response({.status = status, .body = status + "\n"}); }
 
 }  // namespace
 
-struct MetricsEndpoint::Client {
+struct HttpEndpoint::Client {
   FileDescriptor socket;
   std::chrono::steady_clock::time_point end;  // of our patience
   std::string request;
   std::string answer;  // what is not sent yet; empty: the request is not whole
 };
 
-absl::StatusOr<std::unique_ptr<MetricsEndpoint>> MetricsEndpoint::Start(const std::string& listen,
-                                                                        const Metrics& metrics) {
+absl::StatusOr<std::unique_ptr<HttpEndpoint>> HttpEndpoint::Start(const std::string& listen, HttpRoutes routes) {
   WELLSPACE_ASSIGN_OR_RETURN(ListenAddress address, ParseListenAddress(listen));
   absl::StatusOr<ListeningSockets> listening = ListenOn(address);
   if (!listening.ok()) {
     return absl::UnavailableError(absl::StrCat("metrics: ", std::string(listening.status().message())));
   }
   address.port = listening->port;
-  return std::unique_ptr<MetricsEndpoint>(
-      new MetricsEndpoint(std::move(listening->sockets), address.ToString(), metrics));
+  return std::unique_ptr<HttpEndpoint>(
+      new HttpEndpoint(std::move(listening->sockets), address.ToString(), std::move(routes)));
 }
 
-MetricsEndpoint::MetricsEndpoint(std::vector<FileDescriptor> sockets, std::string address, const Metrics& metrics)
+HttpEndpoint::HttpEndpoint(std::vector<FileDescriptor> sockets, std::string address, HttpRoutes routes)
     : sockets_(std::move(sockets)),
       address_(std::move(address)),
-      metrics_(metrics),
+      routes_(std::move(routes)),
       stop_(eventfd(0, EFD_CLOEXEC)),
       thread_([this] { Run(); }) {}
 
-MetricsEndpoint::~MetricsEndpoint() {
+HttpEndpoint::~HttpEndpoint() {
   eventfd_write(stop_.get(), 1);
   thread_.join();
 }
 
-void MetricsEndpoint::Run() {
+void HttpEndpoint::Run() {
   while (true) {
     std::vector<pollfd> watched = {{.fd = stop_.get(), .events = POLLIN, .revents = 0}};
     for (const FileDescriptor& socket : sockets_) {
@@ -92,7 +87,7 @@ void MetricsEndpoint::Run() {
   }
 }
 
-void MetricsEndpoint::Accept(int socket) {
+void HttpEndpoint::Accept(int socket) {
   FileDescriptor connection(accept4(socket, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
   if (connection.get() < 0) {
     if (errno == EMFILE || errno == ENFILE || errno == ENOMEM || errno == ENOBUFS) {
@@ -112,7 +107,7 @@ void MetricsEndpoint::Accept(int socket) {
   }
 }
 
-bool MetricsEndpoint::Serve(Client& client) const {
+bool HttpEndpoint::Serve(Client& client) const {
   char buffer[4096];
   while (client.answer.empty()) {
     const ssize_t got = recv(client.socket.get(), buffer, sizeof(buffer), 0);
@@ -124,7 +119,7 @@ bool MetricsEndpoint::Serve(Client& client) const {
     if (end != std::string::npos) {
       client.answer = AnswerTo(client.request);
     } else if (client.request.size() > kMostRequestBytes) {
-      client.answer = RefusalResponse("431 Request Header Fields Too Large");
+      client.answer = Refusal("431 Request Header Fields Too Large");
     }
   }
   while (!client.answer.empty()) {
@@ -137,32 +132,27 @@ bool MetricsEndpoint::Serve(Client& client) const {
   return false;
 }
 
-std::string MetricsEndpoint::AnswerTo(const std::string& request) const {
+std::string HttpEndpoint::AnswerTo(const std::string& request) const {
   const std::string_view line = std::string_view(request).substr(0, request.find("\r\n"));
   const size_t method_end = line.find(' ');
   const size_t path_end = line.find_first_of(" ?", method_end + 1);
   if (method_end == std::string_view::npos || path_end == std::string_view::npos ||
       line.find(" HTTP/1.", method_end) == std::string_view::npos) {
-    return RefusalResponse("400 Bad Request");
+    return Refusal("400 Bad Request");
   }
-  if (line.substr(method_end + 1, path_end - method_end - 1) != "/metrics") {
-    return RefusalResponse("404 Not Found");
+  const auto route = routes_.find(line.substr(method_end + 1, path_end - method_end - 1));
+  if (route == routes_.end()) {
+    return Refusal("404 Not Found");
   }
   const std::string_view method = line.substr(0, method_end);
   if (method != "GET" && method != "HEAD") {
-    return RefusalResponse("405 Method Not Allowed");
+    return Refusal("405 Method Not Allowed");
   }
-  std::vector<prometheus::MetricFamily> families;
-  for (const std::shared_ptr<prometheus::Collectable>& collectable : metrics_.Collectables()) {
-    std::vector<prometheus::MetricFamily> some = collectable->Collect();
-    std::move(some.begin(), some.end(), std::back_inserter(families));
-  }
-  std::string answer =
-      Response("200 OK", "text/plain; version=0.0.4; charset=utf-8", prometheus::TextSerializer().Serialize(families));
+  std::string response = Response(route->second());
   if (method == "HEAD") {
-    answer.resize(answer.find("\r\n\r\n") + 4);
+    response.resize(response.find("\r\n\r\n") + 4);
   }
-  return answer;
+  return response;
 }
 
 }  // namespace wellspace::server

@@ -1,10 +1,12 @@
-// Prometheus' way to the metrics.
-#ifndef WELLSPACE_SERVER_OBSERVABILITY_METRICS_ENDPOINT_H_
-#define WELLSPACE_SERVER_OBSERVABILITY_METRICS_ENDPOINT_H_
+// HTTP for what looks at a server: Prometheus, probes of Kubernetes, load balancers.
+#ifndef WELLSPACE_SERVER_NETWORK_HTTP_ENDPOINT_H_
+#define WELLSPACE_SERVER_NETWORK_HTTP_ENDPOINT_H_
 
 #include <chrono>
 #include <cstddef>
+#include <functional>
 #include <list>
+#include <map>
 #include <memory>
 #include <string>
 #include <thread>
@@ -13,29 +15,39 @@
 
 #include "absl/status/statusor.h"
 #include "server/base/file_descriptor.h"
-#include "server/observability/metrics.h"
 
 namespace wellspace::server {
 
-// Serves `GET /metrics` over HTTP, on a thread of its own, until it is destroyed; other paths are not found.
+struct HttpAnswer {
+  std::string status = "200 OK";  // code and reason
+  std::string type = "text/plain";
+  std::string body;
+};
+
+// What is answered to GET and HEAD of a path, "/metrics" for example. Called on the thread of the endpoint, so it must
+// not block.
+using HttpRoutes = std::map<std::string, std::function<HttpAnswer()>, std::less<>>;
+
+// Answers GET and HEAD of some paths over HTTP, on a thread of its own, until it is destroyed; other paths are not
+// found.
 //
 // No client waits for another: all connections are served at once, each for kTimeout at most, and when there are
 // kMostClients the oldest goes. An HTTP server with a thread for each client was rejected: a few requests that never
 // come whole hold all.
-class MetricsEndpoint {
+class HttpEndpoint {
  public:
   static constexpr size_t kMostClients = 64;
   static constexpr size_t kMostRequestBytes = 8192;
   static constexpr std::chrono::seconds kTimeout{5};
 
-  // Listens on `listen`, HOST:PORT with an address or "localhost"; port 0 takes a free one. REQUIRES: `metrics`
-  // outlives this.
+  // Listens on `listen`, HOST:PORT with an address or "localhost"; port 0 takes a free one. REQUIRES: what `routes`
+  // read outlives this.
   //
   // Errors:     INVALID_ARGUMENT (listen), UNAVAILABLE (the address cannot be listened on).
-  static absl::StatusOr<std::unique_ptr<MetricsEndpoint>> Start(const std::string& listen, const Metrics& metrics);
-  ~MetricsEndpoint();
-  MetricsEndpoint(const MetricsEndpoint&) = delete;
-  MetricsEndpoint& operator=(const MetricsEndpoint&) = delete;
+  static absl::StatusOr<std::unique_ptr<HttpEndpoint>> Start(const std::string& listen, HttpRoutes routes);
+  ~HttpEndpoint();
+  HttpEndpoint(const HttpEndpoint&) = delete;
+  HttpEndpoint& operator=(const HttpEndpoint&) = delete;
 
   // HOST:PORT with the port in use.
   const std::string& address() const { return address_; }
@@ -43,7 +55,7 @@ class MetricsEndpoint {
  private:
   struct Client;
 
-  MetricsEndpoint(std::vector<FileDescriptor> sockets, std::string address, const Metrics& metrics);
+  HttpEndpoint(std::vector<FileDescriptor> sockets, std::string address, HttpRoutes routes);
 
   void Run();
   void Accept(int socket);
@@ -53,7 +65,7 @@ class MetricsEndpoint {
 
   const std::vector<FileDescriptor> sockets_;
   const std::string address_;
-  const Metrics& metrics_;
+  const HttpRoutes routes_;
   const FileDescriptor stop_;  // readable when the thread is to end
   std::list<Client> clients_;  // the thread's, the oldest first
   std::thread thread_;
@@ -61,4 +73,4 @@ class MetricsEndpoint {
 
 }  // namespace wellspace::server
 
-#endif  // WELLSPACE_SERVER_OBSERVABILITY_METRICS_ENDPOINT_H_
+#endif  // WELLSPACE_SERVER_NETWORK_HTTP_ENDPOINT_H_
