@@ -14,70 +14,159 @@
 namespace wellspace::cli {
 namespace {
 
-// Text for troff.
-std::string Escaped(const std::string& text) {
-  std::string escaped =
-      absl::StrReplaceAll(text, {{"\\", "\\e"}, {"-", "\\-"}, {"'", "\\(aq"}, {"\"", "\\(dq"}, {"\u00b7", "\\(pc"}});
-  if (!escaped.empty() && escaped[0] == '.') {
-    escaped.insert(0, "\\&");
+// What a page consists of. Texts are plain but for words in backticks, which are names that the reader types.
+class Page {
+ public:
+  virtual ~Page() = default;
+  virtual void Heading(const std::string& text) = 0;
+  virtual void CommandHeading(const std::string& synopsis) = 0;
+  virtual void Paragraph(const std::string& text) = 0;
+  virtual void Verbatim(const std::string& text) = 0;
+  // Entries follow one another in a list, which EndList ends. `value` is what follows the names; it may be empty.
+  virtual void Entry(const std::vector<std::string>& names, const std::string& value, const std::string& text) = 0;
+  virtual void EndList() = 0;
+
+  std::string text() const { return text_; }
+
+ protected:
+  std::string text_;
+};
+
+// In the macros of man(7).
+class ManPage : public Page {
+ public:
+  explicit ManPage(const std::string& start) { text_ = start; }
+
+  void Heading(const std::string& text) override {
+    absl::StrAppend(&text_, ".SH ", Escaped(absl::AsciiStrToUpper(text)), "\n");
   }
-  return escaped;
-}
-
-// Lines as they are.
-std::string Verbatim(const std::string& text) {
-  std::string lines = ".nf\n";
-  for (const auto& line : absl::StrSplit(absl::StripTrailingAsciiWhitespace(text), '\n')) {
-    absl::StrAppend(&lines, Escaped(std::string(line)), "\n");
+  void CommandHeading(const std::string& synopsis) override {
+    absl::StrAppend(&text_, ".SS \"", Escaped(synopsis), "\"\n");
   }
-  return lines + ".fi\n";
-}
-
-// Choices may go on in the next line.
-std::string Breakable(const std::string& choices) { return absl::StrReplaceAll(choices, {{"|", "|\\:"}}); }
-
-std::string OptionEntry(const CLI::Option& option) {
-  std::string entry = ".TP\n";
-  if (IsPositional(option)) {
-    absl::StrAppend(&entry, "\\fI", Escaped(option.get_name(true)), "\\fR\n");
-  } else {
-    std::vector<std::string> names;
-    for (const std::string& name : NamesOf(option)) {
-      names.push_back(absl::StrCat("\\fB", Escaped(name), "\\fR"));
+  void Paragraph(const std::string& text) override { absl::StrAppend(&text_, ".PP\n", Marked(text), "\n"); }
+  void Verbatim(const std::string& text) override {
+    text_ += ".PP\n.nf\n";
+    for (const auto& line : absl::StrSplit(absl::StripTrailingAsciiWhitespace(text), '\n')) {
+      absl::StrAppend(&text_, Escaped(std::string(line)), "\n");
     }
-    absl::StrAppend(&entry, absl::StrJoin(names, ", "),
-                    TakesValue(option) ? absl::StrCat(" \\fI", Breakable(Escaped(ValueOf(option))), "\\fR") : "", "\n");
+    text_ += ".fi\n";
   }
-  absl::StrAppend(&entry, Escaped(option.get_description()));
+  void Entry(const std::vector<std::string>& names, const std::string& value, const std::string& text) override {
+    std::vector<std::string> bold;
+    for (const std::string& name : names) {
+      bold.push_back(absl::StrCat("\\fB", Escaped(name), "\\fR"));
+    }
+    // Choices may go on in the next line.
+    const std::string breakable = absl::StrReplaceAll(Escaped(value), {{"|", "|\\:"}});
+    absl::StrAppend(&text_, ".TP\n", absl::StrJoin(bold, ", "), names.empty() || value.empty() ? "" : " ",
+                    value.empty() ? "" : absl::StrCat("\\fI", breakable, "\\fR"), "\n", Marked(text), "\n");
+  }
+  void EndList() override {}
+
+ private:
+  static std::string Escaped(const std::string& text) {
+    std::string escaped =
+        absl::StrReplaceAll(text, {{"\\", "\\e"}, {"-", "\\-"}, {"'", "\\(aq"}, {"\"", "\\(dq"}, {"\u00b7", "\\(pc"}});
+    if (!escaped.empty() && escaped[0] == '.') {
+      escaped.insert(0, "\\&");
+    }
+    return escaped;
+  }
+
+  static std::string Marked(const std::string& text) {
+    std::string marked;
+    bool bold = false;
+    for (const auto& part : absl::StrSplit(text, '`')) {
+      const std::string escaped = Escaped(std::string(part));
+      marked += bold ? absl::StrCat("\\fB", escaped, "\\fR") : escaped;
+      bold = !bold;
+    }
+    return marked;
+  }
+};
+
+// As GitHub shows it.
+class MarkdownPage : public Page {
+ public:
+  explicit MarkdownPage(const std::string& start) { text_ = start; }
+
+  void Heading(const std::string& text) override { absl::StrAppend(&text_, "\n## ", text, "\n"); }
+  void CommandHeading(const std::string& synopsis) override { absl::StrAppend(&text_, "\n### `", synopsis, "`\n"); }
+  void Paragraph(const std::string& text) override { absl::StrAppend(&text_, "\n", Escaped(text), "\n"); }
+  void Verbatim(const std::string& text) override {
+    absl::StrAppend(&text_, "\n```\n", absl::StripTrailingAsciiWhitespace(text), "\n```\n");
+  }
+  void Entry(const std::vector<std::string>& names, const std::string& value, const std::string& text) override {
+    if (!in_list_) {
+      text_ += "\n| | |\n| --- | --- |\n";
+      in_list_ = true;
+    }
+    std::string name = absl::StrJoin(names, ", ");
+    absl::StrAppend(&name, name.empty() || value.empty() ? "" : " ", value);
+    absl::StrAppend(&text_, "| `", absl::StrReplaceAll(name, {{"|", "\\|"}}), "` | ",
+                    absl::StrReplaceAll(Escaped(text), {{"|", "\\|"}, {"\n", " "}}), " |\n");
+  }
+  void EndList() override { in_list_ = false; }
+
+ private:
+  static std::string Escaped(const std::string& text) {
+    return absl::StrReplaceAll(text, {{"<", "&lt;"}, {"*", "\\*"}, {"_", "\\_"}});
+  }
+
+  bool in_list_ = false;
+};
+
+void AddOption(const CLI::Option& option, Page& page) {
+  std::string text = option.get_description();
   if (!option.get_envname().empty()) {
-    absl::StrAppend(&entry, "; or the environment\\(aqs ", Escaped(option.get_envname()));
+    absl::StrAppend(&text, "; or the environment's ", option.get_envname());
   }
-  return entry + "\n";
+  if (IsPositional(option)) {
+    page.Entry({}, option.get_name(true), text);
+  } else {
+    page.Entry(NamesOf(option), TakesValue(option) ? ValueOf(option) : "", text);
+  }
 }
 
-std::string Section(const Command& command) {
+void AddCommand(const Command& command, Page& page) {
   std::string synopsis = absl::StrCat("wellspace ", command.name);
-  std::string positionals;
-  std::string options;
+  std::vector<const CLI::Option*> positionals;
+  std::vector<const CLI::Option*> options;
   for (const CLI::Option* option : command.Options()) {
-    (IsPositional(*option) ? positionals : options) += OptionEntry(*option);
+    (IsPositional(*option) ? positionals : options).push_back(option);
     if (IsPositional(*option)) {
       const bool many = option->get_items_expected_max() > 1;
       const std::string name = absl::StrCat(option->get_name(true), many ? "..." : "");
       absl::StrAppend(&synopsis, " ", option->get_required() ? name : absl::StrCat("[", name, "]"));
     }
   }
+  page.CommandHeading(synopsis + " [options]");
+  page.Paragraph(command.app->get_description() + ".");
+  for (const std::vector<const CLI::Option*>* group : {&positionals, &options}) {
+    for (const CLI::Option* option : *group) {
+      AddOption(*option, page);
+    }
+  }
+  page.EndList();
   // The exit codes have a section of their own.
   const std::string footer = absl::StrReplaceAll(command.app->get_footer(), {{kExitCodesHelp, ""}});
-  return absl::StrCat(".SS \"", Escaped(synopsis), " [options]\"\n", Escaped(command.app->get_description()), ".\n",
-                      positionals, options,
-                      absl::StripAsciiWhitespace(footer).empty() ? "" : absl::StrCat(".PP\n", Verbatim(footer)));
+  if (!absl::StripAsciiWhitespace(footer).empty()) {
+    page.Verbatim(std::string(absl::StripPrefix(footer, "\n")));
+  }
 }
 
-}  // namespace
-
-std::string ManualPage(const CLI::App& app, const std::string& version) {
-  std::string commands;
+// The sections that both pages have.
+void AddSections(const CLI::App& app, Page& page) {
+  page.Heading("Description");
+  page.Paragraph(
+      "A point cloud, or a domain in the plane, becomes a mesh in one call of `mesh`, in this process or on a server. "
+      "On a server a session keeps points and mesh between calls: `session create`, `upload`, `refine`, `download`; "
+      "then `add` or `upload` more points, and `refine` again, at the cost of what is new.");
+  page.Paragraph(
+      "Results go to standard output, progress and errors to standard error. With `--output json` results are JSON, "
+      "and errors a JSON object in one line. Files named `-` are standard input or output. Ctrl-C cancels the work of "
+      "`mesh`, `estimate` and `refine`, and ends the others.");
+  page.Heading("Commands");
   std::map<std::string, std::string> environment;
   for (const Command& command : TreeOf(app)) {
     for (const CLI::Option* option : command.Options()) {
@@ -86,30 +175,41 @@ std::string ManualPage(const CLI::App& app, const std::string& version) {
       }
     }
     if (!command.name.empty() && command.Subcommands().empty()) {
-      commands += Section(command);
+      AddCommand(command, page);
     }
   }
-  std::string variables;
+  page.Heading("Exit status");
+  page.Verbatim(kExitCodesHelp);
+  page.Heading("Environment");
   for (const auto& [name, option] : environment) {
-    absl::StrAppend(&variables, ".TP\n\\fB", Escaped(name), "\\fR\nThe default of \\fB\\-\\-", Escaped(option),
-                    "\\fR.\n");
+    page.Entry({name}, "", absl::StrCat("The default of `--", option, "`."));
   }
-  return absl::StrCat(
-      ".TH WELLSPACE 1 \"\" \"wellspace ", Escaped(version), "\" \"User Commands\"\n.SH NAME\nwellspace \\- ",
-      Escaped(absl::AsciiStrToLower(app.get_description().substr(0, 1)) + app.get_description().substr(1)),
-      "\n.SH SYNOPSIS\n\\fBwellspace\\fR \\fIcommand\\fR [\\fIoptions\\fR]\n.SH DESCRIPTION\n"
-      "A point cloud becomes a mesh in one call of \\fBmesh\\fR, in this process or on a server. On a server a session "
-      "keeps points "
-      "and mesh between calls: \\fBsession create\\fR, \\fBupload\\fR, \\fBrefine\\fR, \\fBdownload\\fR; then "
-      "\\fBadd\\fR or "
-      "\\fBupload\\fR more points, and \\fBrefine\\fR again, at the cost of what is new.\n.PP\n"
-      "Results go to standard output, progress and errors to standard error. With \\fB\\-\\-output json\\fR results "
-      "are JSON, and "
-      "errors a JSON object in one line. Files named \\fB\\-\\fR are standard input or output. Ctrl\\-C cancels the "
-      "work of "
-      "\\fBmesh\\fR, \\fBestimate\\fR and \\fBrefine\\fR, and ends the others.\n.SH COMMANDS\n",
-      commands, ".SH EXIT STATUS\n", Verbatim(kExitCodesHelp), ".SH ENVIRONMENT\n", variables,
-      ".SH SEE ALSO\n\\fBwellspaced\\fR(8)\n");
+  page.EndList();
+}
+
+std::string Summary(const CLI::App& app) {
+  const std::string description = app.get_description();
+  return absl::AsciiStrToLower(description.substr(0, 1)) + description.substr(1);
+}
+
+}  // namespace
+
+std::string ManualPage(const CLI::App& app, const std::string& version) {
+  ManPage page(absl::StrCat(".TH WELLSPACE 1 \"\" \"wellspace ", version,
+                            "\" \"User Commands\"\n.SH NAME\nwellspace \\- ", Summary(app),
+                            "\n.SH SYNOPSIS\n\\fBwellspace\\fR \\fIcommand\\fR [\\fIoptions\\fR]\n"));
+  AddSections(app, page);
+  page.Heading("See also");
+  page.Paragraph("`wellspaced`(8)");
+  return page.text();
+}
+
+std::string MarkdownManual(const CLI::App& app) {
+  MarkdownPage page(absl::StrCat("# The tool `wellspace`: ", Summary(app),
+                                 "\n\nThis page is `wellspace manual --format markdown`; the same is the manual page "
+                                 "wellspace(1).\n"));
+  AddSections(app, page);
+  return page.text();
 }
 
 }  // namespace wellspace::cli

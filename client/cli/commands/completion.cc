@@ -29,8 +29,11 @@ void AddCompletionCommands(CLI::App& app, int& exit_code) {
   manual->footer(
       "Example:\n"
       "  wellspace manual | man -l -\n");
-  manual->callback([&app, &exit_code] {
-    std::cout << ManualPage(app, WELLSPACE_VERSION);
+  const auto format = std::make_shared<std::string>("man");
+  manual->add_option("--format", *format, "For man, or as Markdown; default man")
+      ->check(CLI::IsMember({"man", "markdown"}));
+  manual->callback([&app, format, &exit_code] {
+    std::cout << (*format == "man" ? ManualPage(app, WELLSPACE_VERSION) : MarkdownManual(app));
     exit_code = kExitOk;
   });
 }
