@@ -58,8 +58,7 @@ TEST_F(HttpEndpointTest, RefusesOtherMethodsAndWhatIsNoRequest) {
   EXPECT_THAT(AnswerTo("nonsense\r\n\r\n"), StartsWith("HTTP/1.1 400 "));
   EXPECT_THAT(AnswerTo("GET /one\r\n\r\n"), StartsWith("HTTP/1.1 400 "));
   EXPECT_THAT(AnswerTo(std::string(9000, 'x')), StartsWith("HTTP/1.1 431 "));
-  EXPECT_THAT(AnswerTo("HEAD /one HTTP/1.1\r\n\r\n"),
-              AllOf(StartsWith("HTTP/1.1 200 OK\r\n"), EndsWith("\r\n\r\n")));
+  EXPECT_THAT(AnswerTo("HEAD /one HTTP/1.1\r\n\r\n"), AllOf(StartsWith("HTTP/1.1 200 OK\r\n"), EndsWith("\r\n\r\n")));
 }
 
 // As many as would have held every thread of a server that has one for each.
