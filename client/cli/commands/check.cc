@@ -252,7 +252,7 @@ std::vector<core::FaceSeed> SeedsOf(const client::Features& features) {
     seeds.push_back({.at = {seed.x, seed.y},
                      .is_hole = seed.is_hole,
                      .region = seed.region,
-                     .max_area = seed.max_area > 0 ? seed.max_area : std::numeric_limits<double>::infinity(),
+                     .max_area = seed.max_area.value_or(std::numeric_limits<double>::infinity()),
                      .first_segment = static_cast<uint32_t>(seed.first_segment),
                      .segment_count = static_cast<uint32_t>(seed.segment_count)});
   }
