@@ -116,7 +116,7 @@ class MarkdownPage : public Page {
   bool in_list_ = false;
 };
 
-void AddOption(const CLI::Option& option, Page& page) {
+void DescribeOption(const CLI::Option& option, Page& page) {
   std::string text = option.get_description();
   if (!option.get_envname().empty()) {
     absl::StrAppend(&text, "; or the environment's ", option.get_envname());
@@ -128,7 +128,7 @@ void AddOption(const CLI::Option& option, Page& page) {
   }
 }
 
-void AddCommand(const Command& command, Page& page) {
+void DescribeCommand(const Command& command, Page& page) {
   std::string synopsis = absl::StrCat("wellspace ", command.name);
   std::vector<const CLI::Option*> positionals;
   std::vector<const CLI::Option*> options;
@@ -144,7 +144,7 @@ void AddCommand(const Command& command, Page& page) {
   page.Paragraph(command.app->get_description() + ".");
   for (const std::vector<const CLI::Option*>* group : {&positionals, &options}) {
     for (const CLI::Option* option : *group) {
-      AddOption(*option, page);
+      DescribeOption(*option, page);
     }
   }
   page.EndList();
@@ -156,7 +156,7 @@ void AddCommand(const Command& command, Page& page) {
 }
 
 // The sections that both pages have.
-void AddSections(const CLI::App& app, Page& page) {
+void DescribeTool(const CLI::App& app, Page& page) {
   page.Heading("Description");
   page.Paragraph(
       "A point cloud, or a domain in the plane, becomes a mesh in one call of `mesh`, in this process or on a server. "
@@ -175,7 +175,7 @@ void AddSections(const CLI::App& app, Page& page) {
       }
     }
     if (!command.name.empty() && command.Subcommands().empty()) {
-      AddCommand(command, page);
+      DescribeCommand(command, page);
     }
   }
   page.Heading("Exit status");
@@ -198,7 +198,7 @@ std::string ManualPage(const CLI::App& app, const std::string& version) {
   ManPage page(absl::StrCat(".TH WELLSPACE 1 \"\" \"wellspace ", version,
                             "\" \"User Commands\"\n.SH NAME\nwellspace \\- ", Summary(app),
                             "\n.SH SYNOPSIS\n\\fBwellspace\\fR \\fIcommand\\fR [\\fIoptions\\fR]\n"));
-  AddSections(app, page);
+  DescribeTool(app, page);
   page.Heading("See also");
   page.Paragraph("`wellspaced`(8)");
   return page.text();
@@ -208,7 +208,7 @@ std::string MarkdownManual(const CLI::App& app) {
   MarkdownPage page(absl::StrCat("# The tool `wellspace`: ", Summary(app),
                                  "\n\nThis page is `wellspace manual --format markdown`; the same is the manual page "
                                  "wellspace(1).\n"));
-  AddSections(app, page);
+  DescribeTool(app, page);
   return page.text();
 }
 
