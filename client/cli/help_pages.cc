@@ -92,7 +92,18 @@ class MarkdownPage : public Page {
 
   void Heading(const std::string& text) override { absl::StrAppend(&text_, "\n## ", text, "\n"); }
   void CommandHeading(const std::string& synopsis) override { absl::StrAppend(&text_, "\n### `", synopsis, "`\n"); }
-  void Paragraph(const std::string& text) override { absl::StrAppend(&text_, "\n", Escaped(text), "\n"); }
+  void Paragraph(const std::string& text) override {
+    text_ += "\n";
+    size_t width = 0;
+    for (const auto& part : absl::StrSplit(Escaped(text), ' ')) {
+      const std::string word(part);
+      const bool is_first = width == 0;
+      const bool fits = is_first || width + 1 + word.size() <= kWidth;
+      absl::StrAppend(&text_, is_first ? "" : fits ? " " : "\n", word);
+      width = fits && !is_first ? width + 1 + word.size() : word.size();
+    }
+    text_ += "\n";
+  }
   void Verbatim(const std::string& text) override {
     absl::StrAppend(&text_, "\n```\n", absl::StripTrailingAsciiWhitespace(text), "\n```\n");
   }
@@ -112,6 +123,8 @@ class MarkdownPage : public Page {
   static std::string Escaped(const std::string& text) {
     return absl::StrReplaceAll(text, {{"<", "&lt;"}, {"*", "\\*"}, {"_", "\\_"}});
   }
+
+  static constexpr size_t kWidth = 120;
 
   bool in_list_ = false;
 };
@@ -206,8 +219,8 @@ std::string ManualPage(const CLI::App& app, const std::string& version) {
 
 std::string MarkdownManual(const CLI::App& app) {
   MarkdownPage page(absl::StrCat("# The tool `wellspace`: ", Summary(app),
-                                 "\n\nThis page is `wellspace manual --format markdown`; the same is the manual page "
-                                 "wellspace(1).\n"));
+                                 "\n"));
+  page.Paragraph("This page is `wellspace manual --format markdown`; the same is the manual page wellspace(1).");
   DescribeTool(app, page);
   return page.text();
 }

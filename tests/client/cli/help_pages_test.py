@@ -1,6 +1,7 @@
 """The manual page and the shells' completions against --help of every command."""
 
 import os
+import pathlib
 import re
 import shutil
 import subprocess
@@ -51,6 +52,11 @@ class ManualTest(unittest.TestCase):
                 self.assertIn(option, section, command)
         for part in (".SH NAME\n", ".SH EXIT STATUS\n", "130 ", "WELLSPACE_SERVER"):
             self.assertIn(part, page)
+
+    def test_the_page_of_the_documentation_is_it(self):
+        page = pathlib.Path(__file__).resolve().parents[3] / "docs" / "cli.md"
+        self.assertEqual(page.read_text(encoding="utf-8"), run("manual", "--format", "markdown"),
+                         "make it anew: wellspace manual --format markdown > docs/cli.md")
 
     @unittest.skipUnless(shutil.which("groff"), "groff is not installed")
     def test_groff_has_nothing_to_say(self):
