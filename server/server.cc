@@ -122,7 +122,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& optio
     server->listener_ = std::move(listener);
     server->listener_->Start(std::move(acceptor), server->connections_, keeps_files);
   }
-  server->observability_.SetReadiness(Readiness::kServing);
+  server->observability_.SetReadiness(Readiness::kReady);
   return server;
 }
 

@@ -27,7 +27,7 @@ HttpAnswer MetricsAnswer(const Metrics& metrics) {
 
 HttpAnswer ReadinessAnswer(Readiness readiness) {
   switch (readiness) {
-    case Readiness::kServing:
+    case Readiness::kReady:
       return {.body = "ready\n"};
     case Readiness::kRestoring:
       return {.status = "503 Service Unavailable", .body = "restoring sessions\n"};

@@ -29,7 +29,7 @@ struct ObservabilityOptions {
 };
 
 // Whether a server takes calls; what /readyz says.
-enum class Readiness { kRestoring, kServing, kStopping };
+enum class Readiness { kRestoring, kReady, kStopping };
 
 // Thread safety: thread-safe.
 class Observability {
