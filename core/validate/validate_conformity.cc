@@ -316,15 +316,20 @@ class ConformityCheck {
       }
       faces_[number].patch = i;
     }
+    // Of all that are wrong, the one of the first segment is named.
+    const Piece* wrong = nullptr;
     for (size_t p = parts_.boundary.facets.size() / 2; p < made_.pieces.size(); ++p) {
       const Piece& piece = made_.pieces[p];
-      for (const uint32_t face : swept_.beside[p]) {
-        if (faces_[face].patch != kNobody) {
-          return Broken(absl::StrCat(segments_.NameOf(piece.source), ": no facets lead along it from ",
-                                     PlaceName(made_.vertices[piece.ends[0]]), " to ",
-                                     PlaceName(made_.vertices[piece.ends[1]]), ", where triangles are"));
-        }
+      const bool is_beside_triangles = std::any_of(swept_.beside[p].begin(), swept_.beside[p].end(),
+                                                   [&](uint32_t face) { return faces_[face].patch != kNobody; });
+      if (is_beside_triangles && (wrong == nullptr || piece.source < wrong->source)) {
+        wrong = &piece;
       }
+    }
+    if (wrong != nullptr) {
+      return Broken(absl::StrCat(segments_.NameOf(wrong->source), ": no facets lead along it from ",
+                                 PlaceName(made_.vertices[wrong->ends[0]]), " to ",
+                                 PlaceName(made_.vertices[wrong->ends[1]]), ", where triangles are"));
     }
     return absl::OkStatus();
   }

@@ -394,7 +394,7 @@ TEST_F(CommandsTest, CheckHoldsMeshesToTheCriterionAndToSizes) {
   // What cannot be asked for is no violation.
   const std::vector<std::pair<std::vector<std::string>, std::string>> wrong = {
       {{"--criterion", "well-spaced"}, "--criterion requires --rho"},
-      {{"--size", "-1"}, "max_circumradius is -1; "},
+      {{"--size", "-1"}, "--size: expected a number above 0, got \"-1\""},
       {{"--size-box", "0,0,0,1,1,1,1"},
        "--size-box 0,0,0,1,1,1,1: expected low corner, high corner and size, 5 numbers"},
       {{"--size-box", "1,0,0,1,1"}, "size box 0 reaches from 1 to 0 on axis 0; "},

@@ -363,7 +363,8 @@ TEST_F(DomainUploadTest, PolygonsHaveTheSegmentsOfTheirFile) {
   const std::string land = folder_.Write(
       "land.geojson", R"({"type": "Feature", "properties": {"r": 7}, "geometry": {"type": "MultiPolygon", "coordinates":
           [[[[0, 0], [1, 0], [1, 1], [0, 0]]], [[[2, 0], [3, 0], [3, 1], [2, 1], [2, 0]]]]}})");
-  ASSERT_EQ(Run({"upload", "one", land, "--region-property", "r"}).exit_code, 0);
+  const RunResult uploaded = Run({"upload", "one", land, "--region-property", "r"});
+  ASSERT_EQ(uploaded.exit_code, 0) << uploaded.err;
   ASSERT_EQ(requests_.size(), 2u);
   ASSERT_EQ(requests_[1].faces().seeds_size(), 2);
   EXPECT_EQ(requests_[1].faces().seeds(0).polygon().first(), 7u) << "after those of the session";
