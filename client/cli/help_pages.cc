@@ -218,8 +218,7 @@ std::string ManualPage(const CLI::App& app, const std::string& version) {
 }
 
 std::string MarkdownManual(const CLI::App& app) {
-  MarkdownPage page(absl::StrCat("# The tool `wellspace`: ", Summary(app),
-                                 "\n"));
+  MarkdownPage page(absl::StrCat("# The tool `wellspace`: ", Summary(app), "\n"));
   page.Paragraph("This page is `wellspace manual --format markdown`; the same is the manual page wellspace(1).");
   DescribeTool(app, page);
   return page.text();

@@ -28,7 +28,7 @@
 namespace wellspace::core {
 namespace {
 
-constexpr uint32_t kNoPatch = std::numeric_limits<uint32_t>::max();
+constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
 constexpr size_t kStepsBetweenLooks = 1024;
 // By how much an area may be off, relatively: it is a sum of many.
 constexpr double kAreaTolerance = 1e-9;
@@ -55,7 +55,7 @@ struct Patches {
 
 // An edge of a triangle, or a facet.
 struct PatchSide {
-  static constexpr uint32_t kFacet = kNoPatch;
+  static constexpr uint32_t kFacet = kNone;
 
   uint32_t low;
   uint32_t high;
@@ -110,7 +110,7 @@ absl::StatusOr<Patches> FindPatches(const MeshView& mesh, std::span<const uint32
     }
   }
   Patches patches;
-  patches.of_triangle.resize(triangles, kNoPatch);
+  patches.of_triangle.resize(triangles, kNone);
   for (uint32_t t = 0; t < triangles; ++t) {
     const uint32_t root = root_of(t);  // not above t
     if (root == t) {
@@ -211,10 +211,10 @@ class ConformityCheck {
 
  private:
   struct DomainFace {
-    uint32_t patch = kNoPatch;
-    uint32_t piece = kNoPatch;  // beside it
+    uint32_t patch = kNone;
+    uint32_t piece = kNone;  // beside it
     bool is_meshed = false;
-    uint32_t seed = kNoPatch;  // that says something of it
+    uint32_t seed = kNone;  // that says something of it
     double area = 0;
     double perimeter = 0;
   };
@@ -309,7 +309,7 @@ class ConformityCheck {
       if (number == SweptFaces::kOnPiece) {
         return Broken(absl::StrCat("triangle ", patches_.largest[i], ": a segment runs through it"));
       }
-      if (faces_[number].patch != kNoPatch) {
+      if (faces_[number].patch != kNone) {
         return Broken(
             absl::StrCat("triangles ", patches_.largest[faces_[number].patch], " and ", patches_.largest[i],
                          ": they are in one face of the domain, and no triangles lead from one to the other"));
@@ -321,7 +321,7 @@ class ConformityCheck {
     for (size_t p = parts_.boundary.facets.size() / 2; p < made_.pieces.size(); ++p) {
       const Piece& piece = made_.pieces[p];
       const bool is_beside_triangles = std::any_of(swept_.beside[p].begin(), swept_.beside[p].end(),
-                                                   [&](uint32_t face) { return faces_[face].patch != kNoPatch; });
+                                                   [&](uint32_t face) { return faces_[face].patch != kNone; });
       if (is_beside_triangles && (wrong == nullptr || piece.source < wrong->source)) {
         wrong = &piece;
       }
@@ -378,7 +378,7 @@ class ConformityCheck {
         const std::vector<uint32_t> polygons,
         FindPolygonsAround(std::span<const Point<2>>(places_).first(patches), domain_.points, features_, context_));
     for (uint32_t i = 0; i < patches; ++i) {
-      faces_[swept_.face_of[i]].seed = polygons[i] == kInNoPolygon ? kNoPatch : polygons[i];
+      faces_[swept_.face_of[i]].seed = polygons[i] == kInNoPolygon ? kNone : polygons[i];
     }
     bool has_holes = false;
     for (uint32_t i = 0; i < features_.seeds.size(); ++i) {
@@ -390,9 +390,9 @@ class ConformityCheck {
       }
     }
     for (DomainFace& face : faces_) {
-      if (face.seed != kNoPatch && features_.seeds[face.seed].is_hole) {
+      if (face.seed != kNone && features_.seeds[face.seed].is_hole) {
         face.is_meshed = false;
-      } else if (face.patch == kNoPatch && face.seed == kNoPatch && has_holes) {
+      } else if (face.patch == kNone && face.seed == kNone && has_holes) {
         face.is_meshed = false;  // it may be in a polygon that is a hole
       }
     }
@@ -401,7 +401,7 @@ class ConformityCheck {
 
   std::string WhyNotMeshed(uint32_t number) const {
     const uint32_t seed = faces_[number].seed;
-    return seed != kNoPatch && features_.seeds[seed].is_hole
+    return seed != kNone && features_.seeds[seed].is_hole
                ? absl::StrCat("it is in the face of seeds[", seed, "], a hole")
            : number == 0 ? "it is in the unbounded face, which segments do not enclose"
                          : "an even number of rings surrounds it";
@@ -411,16 +411,16 @@ class ConformityCheck {
   absl::Status CheckFaces() const {
     for (uint32_t number = 0; number < faces_.size(); ++number) {
       const DomainFace& face = faces_[number];
-      if (face.patch != kNoPatch && !face.is_meshed) {
+      if (face.patch != kNone && !face.is_meshed) {
         return Broken(absl::StrCat("triangle ", patches_.largest[face.patch], ": ", WhyNotMeshed(number)));
       }
-      if (face.patch == kNoPatch && face.is_meshed) {
+      if (face.patch == kNone && face.is_meshed) {
         const Piece& piece = made_.pieces[face.piece];
         return Broken(absl::StrCat(
             "the face beside ", segments_.NameOf(piece.source), ", from ", PlaceName(made_.vertices[piece.ends[0]]),
             " to ", PlaceName(made_.vertices[piece.ends[1]]), ", is to be meshed, and has no triangles"));
       }
-      if (face.patch != kNoPatch) {
+      if (face.patch != kNone) {
         const double area = patches_.areas[face.patch];
         if (std::abs(area - face.area) > kAreaTolerance * std::abs(face.area) + 4 * tolerance_ * face.perimeter) {
           return Broken(absl::StrCat("the face of triangle ", patches_.largest[face.patch], " has an area of ",
@@ -435,7 +435,7 @@ class ConformityCheck {
     const size_t first = patches_.largest.size() + features_.seeds.size();
     for (size_t i = 0; i < no_vertices_.size(); ++i) {
       const uint32_t face = swept_.face_of[first + i];
-      if (face != SweptFaces::kOnPiece && faces_[face].patch != kNoPatch) {
+      if (face != SweptFaces::kOnPiece && faces_[face].patch != kNone) {
         return Broken(absl::StrCat("points[", no_vertices_[i], "] at ", PlaceName(places_[first + i]),
                                    " lies in a face that is meshed, and is no vertex"));
       }
@@ -453,9 +453,9 @@ class ConformityCheck {
         WELLSPACE_RETURN_IF_ERROR(context_.Check());
       }
       const uint32_t number = faces_[swept_.face_of[patches_.of_triangle[t]]].seed;
-      const FaceSeed seed = number == kNoPatch ? FaceSeed() : features_.seeds[number];
+      const FaceSeed seed = number == kNone ? FaceSeed() : features_.seeds[number];
       const auto owner = [&] {
-        return number == kNoPatch ? "a face without a seed" : absl::StrCat("the face of seeds[", number, "]");
+        return number == kNone ? "a face without a seed" : absl::StrCat("the face of seeds[", number, "]");
       };
       if (const double area = AreaOf(CornersOfTriangle(mesh_, t)); area > seed.max_area * (1 + kAreaTolerance)) {
         return Broken(absl::StrCat("triangle ", t, ": its area is ", area, "; at most ", seed.max_area,

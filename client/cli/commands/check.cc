@@ -409,7 +409,8 @@ int CheckCommand::Run() {
   if (!sizes.ok()) {
     return ReportError(sizes.status(), format);
   }
-  if (!mesh->weights.empty() && (rho != 0 || max_circumradius.has_value() || !size_boxes.empty() || size_field.IsGiven())) {
+  if (!mesh->weights.empty() &&
+      (rho != 0 || max_circumradius.has_value() || !size_boxes.empty() || size_field.IsGiven())) {
     return ReportError(absl::InvalidArgumentError(absl::StrCat(
                            mesh_path,
                            ": --rho, --size, --size-box and --size-field are about Delaunay simplices, and this "

@@ -268,8 +268,8 @@ TEST_F(DomainCommandsTest, CheckKnowsWhatWasRefusedAtSmallAngles) {
     absl::StrAppend(&zigzag, i, " ", i, " ", i + 1, "\n");
   }
   Mesh("zigzag.poly", zigzag + "0\n", {"--min-angle", "30", "--faces", "box"});
-  const RunResult kept =
-      RunWellspace({"check", Path("out.msh"), "--cloud", Path("zigzag.poly"), "--faces", "box", "--rho", "1.0000000001"});
+  const RunResult kept = RunWellspace(
+      {"check", Path("out.msh"), "--cloud", Path("zigzag.poly"), "--faces", "box", "--rho", "1.0000000001"});
   EXPECT_EQ(kept.exit_code, 0) << kept.out << kept.err;
   const RunResult broken =
       RunWellspace({"check", Path("out.msh"), "--cloud", Path("zigzag.poly"), "--faces", "box", "--rho", "0.7"});
