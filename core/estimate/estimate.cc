@@ -237,7 +237,11 @@ class Integrator {
   // The square of the size that is asked for at a place, be it by the largest area in its face.
   double SizeSqAt(const Point<D>& x, const Surroundings& at) const {
     const double size_sq = sizes_.IsUnbounded() ? kInfinity : sizes_.AtSq(x);
-    return domain_.has_value() ? std::min(size_sq, kRadiusSqOfArea * domain_->face(at.face).max_area) : size_sq;
+    if (!domain_.has_value()) {
+      return size_sq;
+    }
+    const double least = kLeastSize * box_.LongestSide();  // as of sizes
+    return std::min(size_sq, std::max(least * least, kRadiusSqOfArea * domain_->face(at.face).max_area));
   }
 
   // The bounds of h over a cell.

@@ -143,6 +143,7 @@ class Connections::Connection {
   std::atomic<uint64_t> of_messages = 0;  // of callers whom the server knows, ever
   int known_calls = 0;                    // of callers whom the server knows
   int known_calls_lately = 0;             // the most, since known_since
+  bool was_known = false;                 // has ever had one
   Clock::time_point known_since = Clock::now();
   // As of the last look.
   Clock::time_point looked = Clock::now();
@@ -266,8 +267,7 @@ void Connections::ShutUnclaimed() {
 int64_t Connections::LastingExcessOf(const Connection& connection) {
   // Calls may have been read, and not begun yet; with the second look they have. Before the first has begun, windows
   // are too small for that.
-  const bool has_called = connection.known_calls_lately > 0 || connection.of_messages > 0;
-  return has_called ? std::min(connection.excess, connection.excess_before) : connection.excess;
+  return connection.was_known ? std::min(connection.excess, connection.excess_before) : connection.excess;
 }
 
 void Connections::CountUnclaimed(Connection& connection, Clock::time_point now) const {
@@ -300,7 +300,8 @@ void Connections::CountUnclaimed(Connection& connection, Clock::time_point now) 
 
 int64_t Connections::UnderWayOf(const Connection& connection) const {
   const auto of_messages = static_cast<int64_t>(connection.of_messages.load());
-  const int64_t of_calls = connection.known_calls_lately * kUnderWayOfACall;
+  const int64_t calls = connection.was_known ? std::max(1, connection.known_calls_lately) : 0;
+  const int64_t of_calls = calls * kUnderWayOfACall;
   return std::min(of_calls + std::min(2 * of_messages, kMostClaimedByEnds), static_cast<int64_t>(limits_.max_received));
 }
 
@@ -314,6 +315,7 @@ std::shared_ptr<Connections::Connection> Connections::CallBegan(std::string_view
   const std::shared_ptr<Connection> connection = found->second;
   ++connection->calls;
   connection->known_calls += is_known ? 1 : 0;
+  connection->was_known |= is_known;
   if (connection->known_calls > connection->known_calls_lately) {
     connection->known_calls_lately = connection->known_calls;
     connection->known_since = Clock::now();

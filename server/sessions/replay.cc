@@ -53,7 +53,8 @@ class Structure {
   }
 
   absl::Status AddPointsUntil(uint64_t end, core::RunContext& context) {
-    return AddPointsTo(*mesher_, points_, std::exchange(taken_, end), end, context);
+    const uint64_t first = std::exchange(taken_, end);
+    return first == end ? absl::OkStatus() : AddPointsTo(*mesher_, points_, first, end, context);
   }
 
   const PointStore& points_;
@@ -81,9 +82,6 @@ uint64_t BytesWithVertices(const core::Mesher& mesher, uint64_t count) {
 
 absl::Status AddPointsTo(core::Mesher& mesher, const PointStore& points, uint64_t first, uint64_t end,
                          core::RunContext& context) {
-  if (first == end) {
-    return absl::OkStatus();
-  }
   const uint64_t dimension = mesher.dimension();
   WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(BytesWithVertices(mesher, end - first)));
   WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> added, points.Copy(first * dimension, end * dimension, context));

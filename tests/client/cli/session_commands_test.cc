@@ -301,11 +301,14 @@ class DomainUploadTest : public SessionCommandsTest {
     };
     server_.sessions.upload = [this](grpc::ServerContext&, auto& reader, v1::UploadPointsResponse& response) {
       v1::UploadPointsRequest request;
+      uint64_t end = 0;
       while (reader.Read(&request)) {
-        first_point_ = request.points().coordinates().empty() ? first_point_ : request.point_offset();
+        const auto points = static_cast<uint64_t>(request.points().coordinates_size()) / 2;
+        first_point_ = points == 0 ? first_point_ : request.point_offset();
+        end = std::max(end, request.point_offset() + points);
         expected_.push_back(request.expected_revision());
       }
-      response.set_committed_points(1237);
+      response.set_committed_points(std::max<uint64_t>(1237, end));
       response.set_revision(5);
       return grpc::Status::OK;
     };

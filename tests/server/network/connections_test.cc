@@ -264,7 +264,7 @@ constexpr int64_t kBeginning = 8192;
 TEST_F(ConnectionsTest, WhatNoCallClaimsIsBoundedAndHalvedForAHostThatWasShut) {
   constexpr int64_t kMost = Connections::kMostUnclaimed;
   constexpr int64_t kLeast = Connections::kLeastUnclaimedOfABadHost;
-  for (const int64_t allowed : {kMost, kMost / 2, kLeast, kLeast}) {
+  for (const int64_t allowed : {kMost, kMost / 2, kMost / 4, kMost / 8, kMost / 16, kMost / 32, kLeast, kLeast}) {
     SendingPeer peer(connections_, 1);
     peer.Send(kBeginning + allowed);
     Look();
@@ -274,7 +274,17 @@ TEST_F(ConnectionsTest, WhatNoCallClaimsIsBoundedAndHalvedForAHostThatWasShut) {
     EXPECT_TRUE(peer.IsShut()) << allowed;
     connections_.Sweep();
   }
-  EXPECT_EQ(connections_.ShutCount(), 4u);
+  EXPECT_EQ(connections_.ShutCount(), 8u);
+}
+
+// gRPC hands a call of one message over when that has come: it takes seconds where a network is slow.
+TEST_F(ConnectionsTest, OneOfTheLargestMessagesMayComeSlowlyBeforeItsCallBegins) {
+  SendingPeer peer(connections_, 1);
+  for (int i = 0; i < 64; ++i) {
+    peer.Send(kMaxRequestBytes / 64);
+    Look();
+    ASSERT_FALSE(peer.IsShut()) << i;
+  }
 }
 
 TEST_F(ConnectionsTest, WhatComesBeforeAnyCallIsLookedAtOnce) {

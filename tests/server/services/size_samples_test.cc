@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -37,12 +38,14 @@ class SizeSamplesTest : public ::testing::Test {
       : harness_(core::MeshPoints, options, Transport::kInProcess, core::EstimateMesh) {}
 
   // Meshes the unit square; each of `chunks` is a message.
-  Result MeshWith(const std::vector<v1::SizeSamples>& chunks, double gradation = 0) {
+  Result MeshWith(const std::vector<v1::SizeSamples>& chunks, std::optional<double> gradation = std::nullopt) {
     grpc::ClientContext context;
     const auto stream = harness_.stub().MeshPoints(&context);
     v1::MeshPointsRequest request;
     *request.mutable_parameters() = UnitCubeParameters(2);
-    request.mutable_parameters()->set_gradation(gradation);
+    if (gradation.has_value()) {
+      request.mutable_parameters()->set_gradation(*gradation);
+    }
     stream->Write(request);
     for (const v1::SizeSamples& chunk : chunks) {
       *request.mutable_size_samples() = chunk;

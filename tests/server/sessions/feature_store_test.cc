@@ -1,5 +1,6 @@
 #include "server/sessions/feature_store.h"
 
+#include <optional>
 #include <vector>
 
 #include "gmock/gmock.h"
@@ -19,15 +20,16 @@ v1::SegmentChunk Chunk(const std::vector<uint32_t>& ends, const std::vector<int3
   return chunk;
 }
 
-v1::FaceOptions Faces(v1::FaceRule rule, const std::vector<double>& seeds = {}, double max_area = 0) {
+v1::FaceOptions Faces(v1::FaceRule rule, const std::vector<double>& seeds = {},
+                      std::optional<double> max_area = std::nullopt) {
   v1::FaceOptions options;
   options.set_faces(rule);
   for (size_t i = 0; i < seeds.size(); i += 2) {
     v1::FaceSeed& seed = *options.add_seeds();
     seed.set_x(seeds[i]);
     seed.set_y(seeds[i + 1]);
-    if (max_area > 0) {
-      seed.set_max_area(max_area);
+    if (max_area.has_value()) {
+      seed.set_max_area(*max_area);
     }
   }
   return options;

@@ -1,5 +1,6 @@
 // Sessions on a server with little memory: "refinement that eats the memory" ends with figures, and nothing else ends
 // with it.
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,12 +16,14 @@ constexpr size_t kPiece = 40'000;  // points of a message
 
 class SessionMemoryTest : public ::testing::Test {
  protected:
-  // Refines with circumradii of at most `size`.
-  v1::Operation Refine(const std::string& name, double size) {
+  // Refines with circumradii of at most `size`, if it is given.
+  v1::Operation Refine(const std::string& name, std::optional<double> size = std::nullopt) {
     v1::StartRefinementRequest request;
     request.set_name(name);
     *request.mutable_parameters() = UnitCubeParameters();
-    request.mutable_parameters()->set_max_circumradius(size);
+    if (size.has_value()) {
+      request.mutable_parameters()->set_max_circumradius(*size);
+    }
     Watch watch(calls_.operations(), calls_.Start(request).name());
     EXPECT_TRUE(watch.Finish().ok());
     return watch.operation.value_or(v1::Operation());
@@ -67,7 +70,7 @@ TEST_F(SessionMemoryTest, ARefinementThatNeedsTooMuchFailsAndLeavesTheSessionAsI
   v1::Session session = calls_.Get(name);
   EXPECT_EQ(session.state(), v1::Session::STATE_OPEN);
   EXPECT_EQ(session.committed_points(), 1000u);
-  EXPECT_EQ(Refine(name, 0).state(), v1::Operation::STATE_SUCCEEDED) << "with less it goes";
+  EXPECT_EQ(Refine(name).state(), v1::Operation::STATE_SUCCEEDED) << "with less it goes";
 
   const uint64_t vertices = calls_.Get(name).vertex_count();
   ExpectMemoryLimit(Refine(name, 0.004));  // no estimate now: it has to grow until it is stopped
@@ -75,7 +78,7 @@ TEST_F(SessionMemoryTest, ARefinementThatNeedsTooMuchFailsAndLeavesTheSessionAsI
   EXPECT_EQ(session.state(), v1::Session::STATE_READY);
   EXPECT_EQ(session.committed_points(), 1000u);
   EXPECT_EQ(session.vertex_count(), vertices) << "the last mesh is there still";
-  EXPECT_EQ(Refine(name, 0).state(), v1::Operation::STATE_SUCCEEDED) << "built again";
+  EXPECT_EQ(Refine(name).state(), v1::Operation::STATE_SUCCEEDED) << "built again";
   EXPECT_EQ(calls_.Get(name).vertex_count(), vertices) << "and the same";
   ExpectMemoryLimit(Refine(name, 0.004));
   grpc::Status status;
@@ -87,7 +90,7 @@ TEST_F(SessionMemoryTest, VerticesThatAreAddedAreCounted) {
   const std::string other = TakeMostOfTheMemory();
   const std::string name = calls_.Create().name();
   calls_.Upload(name, 0, UniformPoints(1000, 3, 5));
-  Refine(name, 0);
+  Refine(name);
   grpc::Status status;
   uint64_t added = 0;
   for (uint64_t seed = 0; status.ok(); ++seed) {

@@ -103,6 +103,7 @@ TEST_F(DeltaSnapshotTest, MetadataAreThoseOfTheMeshItMakes) {
 
 // Clients know by them whether the mesh that they had was the base.
 TEST_F(DeltaSnapshotTest, EachArrayHasItsChecksum) {
+  next_.input_vertex.assign(20, 3);
   next_.weights.assign(next_.vertex_count(), 0.5);
   next_.simplex_regions.assign(next_.simplex_count(), 1);
   next_.facets.assign(3 * 7, 2);
