@@ -51,8 +51,8 @@ struct ConnectionLimits {
 //   - when the peer has read nothing for `max_unread` although something waits for it.
 // A message that has not come whole is claimed by none yet. So a caller whom the server knows may have kUnderWayOfACall
 // under way for each call that it has, or had lately, and for one that is about to begin; and before calls begin, twice
-// what came of messages before, up to kMostClaimedByEnds, to which the windows of HTTP/2 may have grown. All of it is at
-// most `max_received`.
+// what came of messages before, up to kMostClaimedByEnds, to which the windows of HTTP/2 may have grown. All of it is
+// at most `max_received`.
 //
 // What the peer has sent to a connection that is shut, and gRPC has not read, is thrown away. What gRPC has read it
 // works off: as long as there are more than kMostOrphans such calls, no connection should be accepted.
@@ -73,8 +73,8 @@ class Connections {
   static constexpr std::chrono::seconds kForgivenAfter{10};  // one connection that was shut
 
   // In bytes. gRPC hands us a call with its first message, so that one of the largest has to be allowed on each
-  // connection; but of all together not many more, since it makes up to 100 bytes of memory of one byte of headers whose
-  // end does not come.
+  // connection; but of all together not many more, since it makes up to 100 bytes of memory of one byte of headers
+  // whose end does not come.
   static constexpr int64_t kMostUnclaimed = int64_t{kMaxRequestBytes} + (int64_t{512} << 10);
   static constexpr int64_t kMostUnclaimedAtOnce = int64_t{64} << 20;  // needs no second look
   static constexpr int64_t kLeastUnclaimedOfABadHost = int64_t{128} << 10;
