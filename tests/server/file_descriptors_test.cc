@@ -224,12 +224,17 @@ TEST(DurableFileDescriptors, AFileThatMustNotGrowIsAFullDisk) {
   Daemon daemon({"--data", folder.Path("data")}, folder.Path("log"), "ulimit -f 40960");  // blocks of 512 bytes
   SessionCalls calls(grpc::CreateChannel(daemon.address(), grpc::InsecureChannelCredentials()));
   const std::string name = calls.Create().name();
-  const std::vector<double> points = UniformPoints(1'000'000, 3, 1);  // 24 MB, where 21 go
+  constexpr uint64_t kPiece = 100'000;
+  constexpr uint64_t kPoints = 10 * kPiece;  // 24 MB, where 21 go
+  std::vector<v1::UploadPointsRequest> requests;
+  for (uint64_t first = 0; first < kPoints; first += kPiece) {
+    requests.push_back(UploadRequest(name, first, UniformPoints(kPiece, 3, first)));
+  }
   grpc::Status status;
-  calls.Upload(name, 0, points, &status);
+  calls.Upload(requests, &status);
   EXPECT_EQ(DetailsOf(status).reason, "DISK_FULL") << status.error_message();
   const uint64_t committed = calls.Get(name).committed_points();
-  EXPECT_LT(committed, points.size() / 3);
+  EXPECT_LT(committed, kPoints);
   EXPECT_EQ(calls.Upload(name, committed, UniformPoints(10, 3, 2)).committed_points(), committed + 10);
   daemon.Stop();
   EXPECT_THAT(folder.Read("log"), Not(HasSubstr("store_failed")));

@@ -35,6 +35,9 @@ TEST(JobPool, ALargeJobWaitsForMemoryWhileSmallOnesOfOthersFinish) {
     EXPECT_TRUE(small.status.ok()) << small.status;
   }
   EXPECT_EQ(pool.GetLoad().queued, 1);
+  while (pool.GetLoad().running > 1) {  // the last small one has ended, but may still have its memory
+    std::this_thread::yield();
+  }
   holder.may_end.Set();
   ASSERT_TRUE(large.reserved.Wait());
   EXPECT_TRUE(large.status.ok()) << large.status;
