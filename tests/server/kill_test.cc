@@ -23,12 +23,13 @@
 #include "tests/server/session_calls.h"
 #include "tests/server/store/store_support.h"
 #include "tests/server/subprocess.h"
+#include "tests/support/amount.h"
 
 namespace wellspace::server {
 namespace {
 
 // Deaths of the process; the long test has a thousand.
-constexpr int kKills = WELLSPACE_KILLS;
+const int kKills = test::Amount("WELLSPACE_KILLS", 25);
 constexpr int kClients = 4;
 constexpr int kDimension = 2;
 

@@ -21,12 +21,13 @@
 #include "tests/server/security/certificates.h"
 #include "tests/server/service_methods.h"
 #include "tests/server/session_calls.h"
+#include "tests/support/amount.h"
 #include "tests/support/temporary_folder.h"
 
 namespace wellspace::server {
 namespace {
 
-constexpr absl::Duration kFlood = absl::Seconds(WELLSPACE_FLOOD_SECONDS);
+const absl::Duration kFlood = absl::Seconds(test::Amount("WELLSPACE_FLOOD_SECONDS", 0));
 [[maybe_unused]] constexpr uint64_t kMostMemory = uint64_t{200} << 20;
 [[maybe_unused]] constexpr absl::Duration kServedWithin = absl::Seconds(1);
 // Of one connection, with what waits in the buffers of the system. Far more, and it is not shut.

@@ -24,14 +24,15 @@
 #include "spdlog/logger.h"
 #include "tests/server/service_harness.h"
 #include "tests/server/store/store_support.h"
+#include "tests/support/amount.h"
 #include "tests/support/seeded_test.h"
 
 namespace wellspace::server {
 namespace {
 
 // Lives, and variations of each; the long test has many.
-constexpr int kLives = WELLSPACE_LIVES;
-constexpr int kVariations = WELLSPACE_VARIATIONS;
+const int kLives = test::Amount("WELLSPACE_LIVES", 6);
+const int kVariations = test::Amount("WELLSPACE_VARIATIONS", 6);
 
 // A step of a life.
 struct LifeStep {

@@ -1,7 +1,6 @@
 // Random lives of the server's services, sessions and store on a disk that loses power: what clients were answered is
 // there afterwards, and what they were not is there wholly or not at all.
 #include <array>
-#include <cstdlib>
 #include <iostream>
 #include <string>
 #include <utility>
@@ -11,6 +10,7 @@
 #include "gtest/gtest.h"
 #include "tests/server/histories/session_life.h"
 #include "tests/server/store/simulated_disk.h"
+#include "tests/support/amount.h"
 #include "tests/support/clouds.h"
 
 namespace wellspace::server {
@@ -55,8 +55,7 @@ int CountProblems(uint64_t first_seed, int histories, const Plant& plant, std::s
 }
 
 TEST(SessionHistories, NothingThatWasAnsweredIsLost) {
-  const char* wanted = std::getenv("WELLSPACE_HISTORIES");
-  const int histories = wanted != nullptr ? std::atoi(wanted) : WELLSPACE_HISTORIES;
+  const int histories = test::Amount("WELLSPACE_HISTORIES", 1000);
   const uint64_t seed = test::Seed(20261129);
   std::cout << histories << " histories from WELLSPACE_SEED=" << seed << " on\n";
   std::string problem;

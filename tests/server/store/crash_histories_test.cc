@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <cstdlib>
 #include <iostream>
 #include <string>
 #include <vector>
@@ -16,6 +15,7 @@
 #include "server/store/data_folder.h"
 #include "tests/server/store/simulated_disk.h"
 #include "tests/server/store/store_life.h"
+#include "tests/support/amount.h"
 #include "tests/support/clouds.h"
 
 namespace wellspace::server {
@@ -69,8 +69,7 @@ int CountProblems(uint64_t first_seed, int histories, const Bugs& bugs, std::str
 }
 
 TEST(CrashHistories, NothingAcknowledgedIsLost) {
-  const char* wanted = std::getenv("WELLSPACE_HISTORIES");
-  const int histories = wanted != nullptr ? std::atoi(wanted) : WELLSPACE_HISTORIES;
+  const int histories = test::Amount("WELLSPACE_HISTORIES", 1000);
   const uint64_t seed = test::Seed(20261128);
   std::cout << histories << " histories from WELLSPACE_SEED=" << seed << " on\n";
   std::string problem;
