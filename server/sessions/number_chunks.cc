@@ -1,10 +1,16 @@
 #include "server/sessions/number_chunks.h"
 
+#include <malloc.h>
+
 namespace wellspace::server {
 namespace {
 
 // Fewer numbers than these are copied behind others: clients may send them one by one, and a chunk has more than that.
 constexpr int kFew = 1024;
+
+// The heap keeps the pages of chunks that are freed, and is asked for them after so many bytes: each time it looks
+// through all that it has.
+constexpr uint64_t kTrimBytes = uint64_t{16} << 20;
 
 }  // namespace
 
@@ -38,9 +44,15 @@ std::vector<double> NumberChunks::Copy() const {
 std::vector<double> NumberChunks::Flatten(const core::RunContext& context) {
   std::vector<double> numbers;
   numbers.reserve(count_);
+  uint64_t freed = 0;
   while (!chunks_.empty() && !context.IsCancelled()) {
     numbers.insert(numbers.end(), chunks_.front().begin(), chunks_.front().end());
+    freed += chunks_.front().Capacity() * sizeof(double);
     chunks_.pop_front();
+    if (freed >= kTrimBytes) {
+      malloc_trim(0);
+      freed = 0;
+    }
   }
   chunks_.clear();
   count_ = 0;
