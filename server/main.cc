@@ -258,6 +258,8 @@ int Main(int argc, char** argv) {
   }
 
   mallopt(M_MMAP_THRESHOLD, kReturnedBytes);
+  // Each heap keeps what was freed of it. The default is eight for each processor, where no more than one can be used.
+  mallopt(M_ARENA_MAX, std::max(2, resources.processors));
   StopSignals signals;
   signal(SIGPIPE, SIG_IGN);  // standard output or error may be a pipe whose reader has gone
   RaiseDescriptorLimit();
