@@ -231,6 +231,13 @@ class StopSignals {
   sigset_t set_;
 };
 
+// Keeps little of what is freed from the system.
+void BoundHeaps(const Resources& resources) {
+  mallopt(M_MMAP_THRESHOLD, kReturnedBytes);
+  // Each heap keeps what was freed of it. The default is eight for each processor, where no more than one can be used.
+  mallopt(M_ARENA_MAX, std::max(2, resources.processors));
+}
+
 int Main(int argc, char** argv) {
   signal(SIGXFSZ, SIG_IGN);  // a file that must not grow further is a full disk
   Flags flags;
@@ -257,9 +264,7 @@ int Main(int argc, char** argv) {
     return Report(flags.copy, BackUp(flags.copied_folder, flags.copy));
   }
 
-  mallopt(M_MMAP_THRESHOLD, kReturnedBytes);
-  // Each heap keeps what was freed of it. The default is eight for each processor, where no more than one can be used.
-  mallopt(M_ARENA_MAX, std::max(2, resources.processors));
+  BoundHeaps(resources);
   StopSignals signals;
   signal(SIGPIPE, SIG_IGN);  // standard output or error may be a pipe whose reader has gone
   RaiseDescriptorLimit();
