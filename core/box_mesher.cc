@@ -60,7 +60,9 @@ absl::Status BoxMesher<D>::Initialize(const MeshParameters& parameters, std::spa
   numbering_.CountMerged(merged.merged);
   is_given_.assign(structure_.built_count(), true);
   refinement_.emplace(structure_, domain_.MinEdge());
-  adder_.emplace(domain_, merge_distance_, structure_, *refinement_, numbering_, &is_given_);
+  adder_.emplace(
+      domain_, merge_distance_, structure_, [this](VertexId v) { refinement_->VertexAdded(v); }, numbering_,
+      &is_given_);
   context.SetVertices(structure_.vertex_count());
   figures_.tree_seconds = absl::ToDoubleSeconds(context.TimeIn(Phase::kTree));
   return absl::OkStatus();

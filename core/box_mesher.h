@@ -72,7 +72,7 @@ class BoxMesher final : public Mesher {
   Domain<D> domain_;
   ScaledSamples<D> samples_;  // of the last parameters
   QueryStructure<D> structure_;
-  std::optional<Refinement<D>> refinement_;
+  std::optional<BoxRefinement<D>> refinement_;
   bool is_refined_ = false;
   [[no_unique_address]] std::conditional_t<(D >= 3), SliverStage<D>, std::monostate> slivers_;
   bool pumps_ = false;

@@ -11,7 +11,7 @@
 #include "core/domain.h"
 #include "core/features/features.h"
 #include "core/geometry/box.h"
-#include "core/refine/domain/planar_domain.h"
+#include "core/refine/plane/planar_domain.h"
 #include "core/sorted_cloud.h"
 
 namespace wellspace::core {

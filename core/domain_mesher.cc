@@ -149,9 +149,10 @@ absl::Status DomainMesher::Initialize(const MeshParameters& parameters, std::spa
   mesh_box_.low = mesh_box_.high = domain_.Unscaled(structure_.point(VertexId{0}));
   NoteAddedFrom(0);
   WELLSPACE_RETURN_IF_ERROR(samples_.Take(domain_, mesh_box_, parameters, context));
-  refinement_.emplace(structure_, domain_.MinEdge(), planar_.get());
+  refinement_.emplace(structure_, domain_.MinEdge(), PlaneDomain(*planar_));
   placer_.emplace(domain_, structure_, *planar_);
-  adder_.emplace(domain_, 0, structure_, *refinement_, numbering_, nullptr, &*placer_);
+  adder_.emplace(
+      domain_, 0, structure_, [this](VertexId v) { refinement_->VertexAdded(v); }, numbering_, nullptr, &*placer_);
   context.SetVertices(structure_.vertex_count());
   figures_.tree_seconds = absl::ToDoubleSeconds(context.TimeIn(Phase::kTree));
   return absl::OkStatus();

@@ -19,7 +19,8 @@
 #include "core/mesher_figures.h"
 #include "core/point_adder.h"
 #include "core/point_placer.h"
-#include "core/refine/domain/planar_domain.h"
+#include "core/refine/plane/planar_domain.h"
+#include "core/refine/plane/plane_domain.h"
 #include "core/refine/refine.h"
 #include "core/scaled_samples.h"
 #include "core/simplex/domain_simplices.h"
@@ -89,7 +90,7 @@ class DomainMesher final : public Mesher {
   LargestArea least_area_;    // of the largest areas in faces that are meshed
   QueryStructure<2> structure_;
   std::unique_ptr<PlanarDomain> planar_;
-  std::optional<Refinement<2>> refinement_;
+  std::optional<Refinement<PlaneDomain>> refinement_;
   Workspace<2> workspace_;
   VertexNumbering<2> numbering_;
   std::optional<PointPlacer> placer_;

@@ -6,7 +6,7 @@
 #include "core/base/run_context.h"
 #include "core/mesh.h"
 #include "core/refine/criteria.h"
-#include "core/refine/domain/planar_domain.h"
+#include "core/refine/plane/planar_domain.h"
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {

@@ -24,7 +24,7 @@ absl::StatusOr<std::vector<uint32_t>> PointAdder<D>::AddPoints(std::span<const d
         absl::StrCat("near: it has ", near.size(), " vertices for ", points.size() / D, " points"));
   }
   WELLSPACE_RETURN_IF_ERROR(CheckVertices(near, structure_.vertex_count()));
-  WELLSPACE_ASSIGN_OR_RETURN(const std::vector<PlaceInDomain> places, FindPlaces(points, near, context));
+  WELLSPACE_ASSIGN_OR_RETURN(const std::vector<PlanePlace> places, FindPlaces(points, near, context));
   WELLSPACE_ASSIGN_OR_RETURN(const Merged merged, Merge(points, near, context));
   const bool merges = merge_distance_ > 0;
   const std::vector<uint32_t>& inputs = merged.others.inputs;
@@ -76,7 +76,7 @@ absl::StatusOr<uint32_t> PointAdder<D>::AddVertex(uint32_t near, std::span<const
     return absl::ResourceExhaustedError(absl::StrCat("no more than ", kMaxVertices, " vertices can be numbered"));
   }
   const RunContext context;
-  WELLSPACE_ASSIGN_OR_RETURN(const std::vector<PlaceInDomain> places, FindPlaces(point, {&near, 1}, context));
+  WELLSPACE_ASSIGN_OR_RETURN(const std::vector<PlanePlace> places, FindPlaces(point, {&near, 1}, context));
   WELLSPACE_RETURN_IF_ERROR(CheckPoints<D>(domain_, point, context));
   const VertexId start = numbering_.VertexOf(near);
   uint64_t merged = 0;
@@ -97,11 +97,11 @@ absl::StatusOr<uint32_t> PointAdder<D>::AddVertex(uint32_t near, std::span<const
 
 // Where points lie in a domain of the plane; none where all of the box is meshed.
 template <int D>
-absl::StatusOr<std::vector<PlaceInDomain>> PointAdder<D>::FindPlaces(std::span<const double> points,
-                                                                     std::span<const uint32_t> near,
-                                                                     const RunContext& context) {
+absl::StatusOr<std::vector<PlanePlace>> PointAdder<D>::FindPlaces(std::span<const double> points,
+                                                                  std::span<const uint32_t> near,
+                                                                  const RunContext& context) {
   if (D != 2 || placer_ == nullptr) {
-    return std::vector<PlaceInDomain>();
+    return std::vector<PlanePlace>();
   }
   return placer_->FindAll(
       points, [&](size_t index) { return Start(near, index); }, context);
@@ -195,12 +195,12 @@ absl::StatusOr<VertexId> PointAdder<D>::Find(const Point<D>& p, size_t index, Ve
 // is inserted (PendingVertices::Notify).
 template <int D>
 VertexId PointAdder<D>::Add(VertexId near, const Point<D>& p, std::span<const double> points, size_t index,
-                            const std::vector<PlaceInDomain>& places) {
+                            const std::vector<PlanePlace>& places) {
   const VertexId v = structure_.AddVertex(near, p);
   if (!places.empty()) {
     placer_->Add(places[index]);
   }
-  refinement_.VertexAdded(v);
+  vertex_added_(v);
   numbering_.AddInputVertex(v, points, index);
   return v;
 }

@@ -4,7 +4,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -14,8 +16,7 @@
 #include "core/geometry/point.h"
 #include "core/near_points.h"
 #include "core/point_placer.h"
-#include "core/refine/place_in_domain.h"
-#include "core/refine/refine.h"
+#include "core/refine/plane/plane_place.h"
 #include "core/sorted_cloud.h"
 #include "core/vertex_numbering.h"
 #include "core/voronoi/query_structure.h"
@@ -29,17 +30,19 @@ namespace wellspace::core {
 template <int D>
 class PointAdder {
  public:
-  // Points no farther than `merge_distance` from a vertex become that one. `is_given` has an entry for each vertex, and
-  // is set for those that points become; null: that is not asked for. `placer` is that of a domain in the plane, for
-  // which points are not merged; null: all of the box is meshed.
+  // Points no farther than `merge_distance` from a vertex become that one. `vertex_added` is called with each vertex
+  // that is added, once the structure has it: the refinement has to know of it. `is_given` has an entry for each
+  // vertex, and is set for those that points become; null: that is not asked for. `placer` is that of a domain in the
+  // plane, for which points are not merged; null: all of the box is meshed.
   //
   // REQUIRES:   all that is handed in outlives this.
-  PointAdder(const Domain<D>& domain, double merge_distance, QueryStructure<D>& structure, Refinement<D>& refinement,
-             VertexNumbering<D>& numbering, std::vector<bool>* is_given, PointPlacer* placer = nullptr)
+  PointAdder(const Domain<D>& domain, double merge_distance, QueryStructure<D>& structure,
+             std::function<void(VertexId)> vertex_added, VertexNumbering<D>& numbering, std::vector<bool>* is_given,
+             PointPlacer* placer = nullptr)
       : domain_(domain),
         merge_distance_(merge_distance),
         structure_(structure),
-        refinement_(refinement),
+        vertex_added_(std::move(vertex_added)),
         numbering_(numbering),
         is_given_(is_given),
         placer_(placer) {}
@@ -63,8 +66,8 @@ class PointAdder {
     return near.empty() ? kNoVertex : numbering_.VertexOf(near[index]);
   }
 
-  absl::StatusOr<std::vector<PlaceInDomain>> FindPlaces(std::span<const double> points, std::span<const uint32_t> near,
-                                                        const RunContext& context);
+  absl::StatusOr<std::vector<PlanePlace>> FindPlaces(std::span<const double> points, std::span<const uint32_t> near,
+                                                     const RunContext& context);
   absl::StatusOr<Merged> Merge(std::span<const double> points, std::span<const uint32_t> near,
                                const RunContext& context);
   VertexId FindMerged(const Point<D>& p, VertexId near, uint64_t& merged);
@@ -72,13 +75,13 @@ class PointAdder {
                                                 const RunContext& context);
   absl::StatusOr<VertexId> Find(const Point<D>& p, size_t index, VertexId near);
   VertexId Add(VertexId near, const Point<D>& p, std::span<const double> points, size_t index,
-               const std::vector<PlaceInDomain>& places);
+               const std::vector<PlanePlace>& places);
   void NoteGiven(VertexId v);
 
   const Domain<D>& domain_;
   const double merge_distance_;
   QueryStructure<D>& structure_;
-  Refinement<D>& refinement_;
+  const std::function<void(VertexId)> vertex_added_;
   VertexNumbering<D>& numbering_;
   std::vector<bool>* const is_given_;
   PointPlacer* const placer_;

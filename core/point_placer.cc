@@ -22,10 +22,10 @@ constexpr double kRoom = 1e-9;
 
 }  // namespace
 
-absl::StatusOr<std::vector<PlaceInDomain>> PointPlacer::FindAll(std::span<const double> points,
-                                                                const std::function<VertexId(size_t)>& start,
-                                                                const RunContext& context) {
-  std::vector<PlaceInDomain> places(points.size() / 2);
+absl::StatusOr<std::vector<PlanePlace>> PointPlacer::FindAll(std::span<const double> points,
+                                                             const std::function<VertexId(size_t)>& start,
+                                                             const RunContext& context) {
+  std::vector<PlanePlace> places(points.size() / 2);
   const double within = kOnSegment * domain_.MinSeparation();
   Refused refused;
   for (uint32_t i = 0; i < places.size(); ++i) {
@@ -56,8 +56,8 @@ absl::StatusOr<std::vector<PlaceInDomain>> PointPlacer::FindAll(std::span<const 
 
 // The place of point `index`, which is `p` and no vertex; if it has none, `refused` has it then. Nothing is between it
 // and what is nearest to it, be that a segment or a vertex: so its face is the one there.
-PlaceInDomain PointPlacer::Find(const Point<2>& p, uint32_t index, const Neighbor& nearest, Refused& refused) {
-  PlaceInDomain place;
+PlanePlace PointPlacer::Find(const Point<2>& p, uint32_t index, const Neighbor& nearest, Refused& refused) {
+  PlanePlace place;
   const double reach = std::max(std::sqrt(nearest.distance_sq) * (1 + kRoom), domain_.MinSeparation());
   structure_.SegmentsWithin(p, reach, nearest.vertex, workspace_);
   Beside first;  // the nearest, where its foot is between its ends; the next

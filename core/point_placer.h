@@ -15,8 +15,8 @@
 #include "core/base/run_context.h"
 #include "core/domain.h"
 #include "core/geometry/point.h"
-#include "core/refine/domain/planar_domain.h"
-#include "core/refine/place_in_domain.h"
+#include "core/refine/plane/planar_domain.h"
+#include "core/refine/plane/plane_place.h"
 #include "core/refused_points.h"
 #include "core/voronoi/query_structure.h"
 
@@ -39,12 +39,12 @@ class PointPlacer {
   // Complexity: O(1) each in a refined mesh and near its start.
   // Errors:     INVALID_ARGUMENT, naming the points: not in the domain that is meshed, or nearer to a segment than the
   //             least separation and not on it; CANCELLED, DEADLINE_EXCEEDED.
-  absl::StatusOr<std::vector<PlaceInDomain>> FindAll(std::span<const double> points,
-                                                     const std::function<VertexId(size_t)>& start,
-                                                     const RunContext& context);
+  absl::StatusOr<std::vector<PlanePlace>> FindAll(std::span<const double> points,
+                                                  const std::function<VertexId(size_t)>& start,
+                                                  const RunContext& context);
 
   // Tells the domain that the next vertex has been added there.
-  void Add(const PlaceInDomain& place) { planar_.AddVertex(place.on, place.face); }
+  void Add(const PlanePlace& place) { planar_.AddVertex(place.on, place.face); }
 
  private:
   // A segment beside a point, by its foot there.
@@ -61,7 +61,7 @@ class PointPlacer {
     RefusedPoints too_close;
   };
 
-  PlaceInDomain Find(const Point<2>& p, uint32_t index, const Neighbor& nearest, Refused& refused);
+  PlanePlace Find(const Point<2>& p, uint32_t index, const Neighbor& nearest, Refused& refused);
   absl::Status TooCloseError(const Point<2>& p, size_t index, const Beside& beside) const;
   std::string NameOf(uint32_t segment) const;
   static absl::Status NotMeshedError(const Point<2>& p, size_t index);

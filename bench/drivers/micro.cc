@@ -76,7 +76,7 @@ core::QueryStructure<D> Structure(int64_t count, bool is_refined) {
   core::SortedCloud<D> cloud = Sorted<D>(UniformPoints(D, count));
   ExitUnless(structure.Initialize(cloud.grid, std::move(cloud.points), kMaxLeaves, 1, context));
   if (is_refined) {
-    core::Refinement<D> refinement(structure, UnitDomain<D>().grid_step);
+    core::BoxRefinement<D> refinement(structure, UnitDomain<D>().grid_step);
     core::MeshCriteria<D> demands;
     demands.rho = core::DefaultRho(D);
     ExitUnless(refinement.Run(demands, core::kMaxVertices, 1, context));

@@ -9,7 +9,7 @@
 
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
-#include "core/refine/domain/planar_domain.h"
+#include "core/refine/plane/planar_domain.h"
 
 namespace wellspace::core {
 

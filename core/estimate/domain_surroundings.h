@@ -16,7 +16,7 @@
 #include "core/base/run_context.h"
 #include "core/estimate/near_segments.h"
 #include "core/geometry/point.h"
-#include "core/refine/domain/planar_domain.h"
+#include "core/refine/plane/planar_domain.h"
 #include "core/tree/leaf_tree.h"
 
 namespace wellspace::core {

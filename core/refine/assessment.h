@@ -11,7 +11,7 @@
 
 namespace wellspace::core {
 
-// Made by Assess for a cell in the box, and by DomainRules::AssessCell for one in a domain of the plane, where segments
+// Made by Assess for a cell in the box, and by PlaneRules::AssessCell for one in a domain of the plane, where segments
 // take the place of the faces of the box. Lengths are squared; infinite where there is none.
 struct Assessment {
   // The node to be repaired first: of the nodes whose bound is of the shortest edge the farthest, the plane of the

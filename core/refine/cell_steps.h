@@ -1,5 +1,5 @@
 // The steps of one vertex in the box, computed from its cell. Made by Refinement::RefineByCell for the loop, and by
-// Rounds::Record to be recorded; in a domain DomainSteps takes its place.
+// Rounds::Record to be recorded; in a domain of the plane PlaneSteps takes its place.
 #ifndef WELLSPACE_CORE_REFINE_CELL_STEPS_H_
 #define WELLSPACE_CORE_REFINE_CELL_STEPS_H_
 
@@ -45,13 +45,18 @@ struct alignas(kCacheLines) StepWorkspace {
 template <int D, typename Cells>
 class CellSteps {
  public:
-  // The steps of `v`, which lies on `faces`, in the bucket that ends at `edge_limit_sq`.
+  // The steps of `v` in the bucket that ends at `edge_limit_sq`, by the rules of the box, as those of BoxDomain are.
   //
   // REQUIRES:   all references outlive this.
-  CellSteps(const StepRules<D>& rules, VertexId v, FaceMask faces, double edge_limit_sq, Cells& cells,
-            StepWorkspace<D>& workspace)
-      : rules_(rules), cells_(cells), workspace_(workspace), v_(v), faces_(faces), edge_limit_sq_(edge_limit_sq) {
-    cells_.ComputeOwn(v, rules.ClipAround(v, edge_limit_sq), workspace.own);
+  template <typename Rules>
+  CellSteps(const Rules& rules, VertexId v, double edge_limit_sq, Cells& cells, StepWorkspace<D>& workspace)
+      : rules_(rules.step_rules()),
+        cells_(cells),
+        workspace_(workspace),
+        v_(v),
+        faces_(rules_.FacesOf(v)),
+        edge_limit_sq_(edge_limit_sq) {
+    cells_.ComputeOwn(v, rules_.ClipAround(v, edge_limit_sq), workspace.own);
   }
 
   Polytope<D>& cell() { return workspace_.own.cell; }

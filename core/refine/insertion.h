@@ -3,10 +3,7 @@
 #ifndef WELLSPACE_CORE_REFINE_INSERTION_H_
 #define WELLSPACE_CORE_REFINE_INSERTION_H_
 
-#include <type_traits>
-
 #include "core/base/ids.h"
-#include "core/refine/place_in_domain.h"
 #include "core/refine/steiner_point.h"
 
 namespace wellspace::core {
@@ -29,16 +26,20 @@ struct Insertion {
   double empty_radius_sq = 0;  // no older vertex is nearer to it, up to rounding
 };
 
-// An insertion that a cell asks for, with the point before it was snapped to the boundary.
-template <int D>
-struct InsertionRequest {
-  struct Nowhere {};
+// The place of a vertex in a box, of which nothing is known beside the position.
+struct Nowhere {
+  // Whether the vertex is on a feature, and not where its cell asks for one.
+  static constexpr bool IsOnFeature() { return false; }
+};
 
+// An insertion that a cell asks for, with the point before it was snapped to the boundary. `Place` is that of the
+// domain (box_domain.h), and has the functions of Nowhere.
+template <int D, typename Place = Nowhere>
+struct InsertionRequest {
   Insertion insertion;
   SteinerPoint<D> candidate;
   SteinerPoint<D> point;
-  // Where the point is in a domain of the plane, if there is one.
-  [[no_unique_address]] std::conditional_t<D == 2, PlaceInDomain, Nowhere> place;
+  [[no_unique_address]] Place place;
 };
 
 }  // namespace wellspace::core

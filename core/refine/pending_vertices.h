@@ -29,7 +29,7 @@ namespace wellspace::core {
 
 class ThreadTeam;
 
-// How far a vertex is from the nearest segment that it is not on, squared, if that is less than a limit; else that.
+// How far a vertex is from the nearest feature that it is not on, squared, if that is less than a limit; else that.
 template <int D>
 using FeatureDistance = std::function<double(VertexId, double limit_sq, Workspace<D>&)>;
 

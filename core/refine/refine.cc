@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 #include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
@@ -10,8 +12,7 @@
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
 #include "core/refine/checks.h"
-#include "core/refine/domain/domain_steps.h"
-#include "core/refine/domain/split_place.h"
+#include "core/refine/plane/plane_domain.h"
 
 namespace wellspace::core {
 namespace {
@@ -30,26 +31,22 @@ absl::Status TooManyVerticesError(uint64_t max_vertices) {
                    " vertices; raise max_vertices, the sizes that are asked for, or rho"));
 }
 
-template <int D>
-Refinement<D>::Refinement(QueryStructure<D>& structure, double min_edge, PlanarDomain* domain)
+template <typename Domain>
+Refinement<Domain>::Refinement(QueryStructure<D>& structure, double min_edge, Domain domain)
     : structure_(structure),
       min_edge_(min_edge),
-      domain_(domain),
+      domain_(std::move(domain)),
       pending_(structure, min_edge),
-      rounds_(structure, pending_, stars_),
+      rounds_(structure, domain_, pending_, stars_),
       checks_(structure) {}
 
-template <int D>
-absl::Status Refinement<D>::Run(const MeshCriteria<D>& criteria, uint64_t max_vertices, int threads,
-                                RunContext& context, const RefinementObserver<D>& observer,
-                                const VertexPredictor& predict) {
+template <typename Domain>
+absl::Status Refinement<Domain>::Run(const MeshCriteria<D>& criteria, uint64_t max_vertices, int threads,
+                                     RunContext& context, const RefinementObserver<D>& observer,
+                                     const VertexPredictor& predict) {
   ThreadTeam team(threads);
-  rules_.emplace(structure_, criteria, min_edge_);
-  if constexpr (D == 2) {
-    if (domain_ != nullptr) {
-      domain_rules_.emplace(structure_, *domain_, *rules_);
-    }
-  }
+  step_rules_.emplace(structure_, criteria, min_edge_);
+  rules_.emplace(domain_.RulesFor(structure_, *step_rules_, nullptr));
   max_vertices_ = max_vertices;
   context_ = &context;
   observer_ = &observer;
@@ -59,7 +56,7 @@ absl::Status Refinement<D>::Run(const MeshCriteria<D>& criteria, uint64_t max_ve
     pending_.End();
     WELLSPACE_RETURN_IF_ERROR(ScheduleAll(criteria, predict, team));
   }
-  rounds_.BeginRun(*rules_, domain_, team, context);
+  rounds_.BeginRun(*step_rules_, team, context);
   const absl::Cleanup end = [this] { rounds_.DropRun(); };  // where something is thrown
   absl::Status status = Loop();
   rounds_.EndRun(workspace_.own.counters);
@@ -67,21 +64,19 @@ absl::Status Refinement<D>::Run(const MeshCriteria<D>& criteria, uint64_t max_ve
 }
 
 // Lines 2 to 4 of Figure 4, while another thread predicts how many vertices there will be.
-template <int D>
-absl::Status Refinement<D>::ScheduleAll(const MeshCriteria<D>& criteria, const VertexPredictor& predict,
-                                        ThreadTeam& team) {
+template <typename Domain>
+absl::Status Refinement<Domain>::ScheduleAll(const MeshCriteria<D>& criteria, const VertexPredictor& predict,
+                                             ThreadTeam& team) {
   rounds_.ReattachAll();
   structure_.CommitAll();  // what was added before something was thrown
   absl::Status predicted;
   const absl::Cleanup end = [&team] { team.Drop(); };  // of what is begun, where something is thrown
   team.BeginCall([&] { predicted = Predict(predict); });
   FeatureDistance<D> feature_sq;
-  if constexpr (D == 2) {
-    if (domain_ != nullptr) {
-      feature_sq = [this](VertexId v, double limit_sq, Workspace<2>& workspace) {
-        return domain_rules_->NearestSegmentSq(v, limit_sq, workspace);
-      };
-    }
+  if constexpr (Domain::kHasFeatures) {
+    feature_sq = [this](VertexId v, double limit_sq, Workspace<D>& workspace) {
+      return rules_->NearestFeatureSq(v, limit_sq, workspace);
+    };
   }
   const HugeVector<int16_t> first_buckets = pending_.FirstBuckets(criteria, *context_, team, feature_sq);
   team.End();
@@ -95,8 +90,8 @@ absl::Status Refinement<D>::ScheduleAll(const MeshCriteria<D>& criteria, const V
 }
 
 // Tells the context how many vertices are predicted.
-template <int D>
-absl::Status Refinement<D>::Predict(const VertexPredictor& predict) {
+template <typename Domain>
+absl::Status Refinement<Domain>::Predict(const VertexPredictor& predict) {
   if (predict == nullptr) {
     return absl::OkStatus();
   }
@@ -109,8 +104,8 @@ absl::Status Refinement<D>::Predict(const VertexPredictor& predict) {
 
 // Makes room for so many vertices, and some more, so that arrays need not be moved as they grow; what is not used takes
 // no memory.
-template <int D>
-void Refinement<D>::Reserve(uint32_t vertices) {
+template <typename Domain>
+void Refinement<Domain>::Reserve(uint32_t vertices) {
   vertices += std::min(vertices / 8, std::numeric_limits<uint32_t>::max() - vertices);
   structure_.Reserve(vertices);
   stars_.Reserve(vertices);
@@ -118,8 +113,8 @@ void Refinement<D>::Reserve(uint32_t vertices) {
 }
 
 // Line 5: while vertices are pending, those of the lowest bucket are refined, in rounds where there are many.
-template <int D>
-absl::Status Refinement<D>::Loop() {
+template <typename Domain>
+absl::Status Refinement<Domain>::Loop() {
   WELLSPACE_RETURN_IF_ERROR(RefineInRounds());  // what a run that was stopped has detached
   Schedule& schedule = pending_.schedule();
   for (int lowest = schedule.Lowest(); lowest >= 0; lowest = schedule.Lowest()) {
@@ -141,8 +136,8 @@ absl::Status Refinement<D>::Loop() {
 }
 
 // Refines what is pending below `bucket`.
-template <int D>
-absl::Status Refinement<D>::RefineShorterThan(int bucket) {
+template <typename Domain>
+absl::Status Refinement<Domain>::RefineShorterThan(int bucket) {
   Schedule& schedule = pending_.schedule();
   VertexId below{};
   int its_bucket = 0;
@@ -153,16 +148,15 @@ absl::Status Refinement<D>::RefineShorterThan(int bucket) {
 }
 
 // Refines the vertices that rounds have detached, and before each the vertices that are pending in lower buckets.
-template <int D>
-absl::Status Refinement<D>::RefineInRounds() {
+template <typename Domain>
+absl::Status Refinement<Domain>::RefineInRounds() {
   rounds_.ForgetRecords();
   while (!rounds_.AreDone()) {
-    if (domain_ != nullptr) {
-      domain_->MakeRoom(QueryStructure<D>::kMostUncommitted);
-    }
+    domain_.MakeRoom(QueryStructure<D>::kMostUncommitted);
     rounds_.BeginRound();
     absl::Status status;
-    for (Batch<D>* batch = rounds_.NextBatch(); batch != nullptr; batch = status.ok() ? rounds_.NextBatch() : nullptr) {
+    for (Batch<Domain>* batch = rounds_.NextBatch(); batch != nullptr;
+         batch = status.ok() ? rounds_.NextBatch() : nullptr) {
       status = RefineBatch(*batch);
     }
     rounds_.EndRound();
@@ -172,8 +166,8 @@ absl::Status Refinement<D>::RefineInRounds() {
   return absl::OkStatus();
 }
 
-template <int D>
-absl::Status Refinement<D>::RefineBatch(Batch<D>& batch) {
+template <typename Domain>
+absl::Status Refinement<Domain>::RefineBatch(Batch<Domain>& batch) {
   rounds_.BeginBatch(batch);
   for (; !batch.IsRefined(); ++batch.refined) {
     rounds_.Prefetch(batch);
@@ -190,8 +184,8 @@ absl::Status Refinement<D>::RefineBatch(Batch<D>& batch) {
 }
 
 // Refines the next vertex of a batch, which is pending: by its record, if that is still valid, or else by its cell.
-template <int D>
-absl::Status Refinement<D>::RefineNextOf(Batch<D>& batch) {
+template <typename Domain>
+absl::Status Refinement<Domain>::RefineNextOf(Batch<Domain>& batch) {
   const VertexId v = batch.next();
   const int bucket = rounds_.bucket();
   const size_t first = rounds_.inserted_count();
@@ -202,7 +196,7 @@ absl::Status Refinement<D>::RefineNextOf(Batch<D>& batch) {
     const bool is_valid = IsNextStillValid(batch);
     rounds_.CountRecord(batch, is_valid);
     if (is_valid) {
-      RecordedSteps<D> steps(batch);
+      RecordedSteps<Domain> steps(batch);
       status = RefineVertex(v, bucket, steps);
     } else {
       status = RefineByCell(v, bucket);
@@ -217,8 +211,8 @@ absl::Status Refinement<D>::RefineNextOf(Batch<D>& batch) {
 }
 
 // Refines `v`, which was taken from `bucket`.
-template <int D>
-absl::Status Refinement<D>::RefineTaken(VertexId v, int bucket) {
+template <typename Domain>
+absl::Status Refinement<Domain>::RefineTaken(VertexId v, int bucket) {
   absl::Status status = context_->Check();
   if (status.ok()) {
     status = RefineByCell(v, bucket);
@@ -230,55 +224,36 @@ absl::Status Refinement<D>::RefineTaken(VertexId v, int bucket) {
   return CountRefined();
 }
 
-// Whether the record of the next vertex of a batch is still valid. In a domain it may depend on whether there is a
-// vertex on a segment, however far away.
-template <int D>
-bool Refinement<D>::IsNextStillValid(const Batch<D>& batch) const {
-  if (!batch.IsStillValid(batch.refined, structure_.point(batch.next()))) {
-    return false;
-  }
-  if constexpr (D == 2) {
-    return domain_ == nullptr || AreSplitsInOrder(*domain_, batch.records.RequestsOf(batch.refined));
-  }
-  return true;
+// Whether the record of the next vertex of a batch is still valid.
+template <typename Domain>
+bool Refinement<Domain>::IsNextStillValid(const Batch<Domain>& batch) const {
+  return batch.IsStillValid(batch.refined, structure_.point(batch.next())) &&
+         domain_.AreInOrder(batch.records.RequestsOf(batch.refined));
 }
 
-// Refines `v`, which was taken from `bucket`, by steps that are computed.
-template <int D>
-absl::Status Refinement<D>::RefineByCell(VertexId v, int bucket) {
-  if (domain_ != nullptr) {
-    return RefineInDomain(v, bucket);
-  }
+// Refines `v`, which was taken from `bucket`, by steps that are computed. The order that is checked is promised in a
+// box.
+template <typename Domain>
+absl::Status Refinement<Domain>::RefineByCell(VertexId v, int bucket) {
   CurrentCells cells{*this};
-  CellSteps<D, CurrentCells> steps(*rules_, v, structure_.faces(v), EdgeLimitSq(bucket), cells, workspace_);
-  if constexpr (kChecks) {
+  typename Domain::template Steps<CurrentCells> steps(*rules_, v, EdgeLimitSq(bucket), cells, workspace_);
+  if constexpr (kChecks && !Domain::kHasFeatures) {
     steps.cell().Place();
     checks_.CheckOrder(pending_.schedule(), v, steps.cell(), bucket);
   }
   return RefineVertex(v, bucket, steps);
 }
 
-// The same in a domain of the plane.
-template <int D>
-absl::Status Refinement<D>::RefineInDomain(VertexId v, int bucket) {
-  if constexpr (D == 2) {
-    CurrentCells cells{*this};
-    DomainSteps<CurrentCells> steps(*domain_rules_, *rules_, v, EdgeLimitSq(bucket), cells, workspace_);
-    return RefineVertex(v, bucket, steps);
-  }
-  return absl::OkStatus();
-}
-
 // [HT08] Figure 4 for one vertex, `v`, which was taken from `bucket`: inserts what its steps ask for, until nothing
 // that the bucket may ask for is wrong with its cell, or something shorter comes first.
-template <int D>
+template <typename Domain>
 template <typename Steps>
-absl::Status Refinement<D>::RefineVertex(VertexId v, int bucket, Steps& steps) {
+absl::Status Refinement<Domain>::RefineVertex(VertexId v, int bucket, Steps& steps) {
   while (true) {
     const Assessment* const found = steps.Assess();  // lines 7, 8 and 11
     if (found == nullptr) {
       return absl::ResourceExhaustedError(absl::StrCat("the cell of a vertex has more than ", kMostNodes<D>,
-                                                       " nodes; lower rho = ", rules_->criteria().rho));
+                                                       " nodes; lower rho = ", step_rules_->criteria().rho));
     }
     if (pending_.IsNew(v)) {
       pending_.Notify(v, *found, steps.Notices());  // line 14, put off until v is looked at
@@ -287,7 +262,7 @@ absl::Status Refinement<D>::RefineVertex(VertexId v, int bucket, Steps& steps) {
       pending_.Postpone(v, *found, bucket);
       return absl::OkStatus();
     }
-    const InsertionRequest<D>* const request = steps.NextRequest();
+    const typename Domain::Request* const request = steps.NextRequest();
     if (request == nullptr) {
       Finish(v, *found, bucket, steps);
       return absl::OkStatus();
@@ -300,12 +275,12 @@ absl::Status Refinement<D>::RefineVertex(VertexId v, int bucket, Steps& steps) {
 }
 
 // Line 15: `v`, which was taken from `bucket` and asks for nothing there, is done, or pending in a later bucket.
-template <int D>
+template <typename Domain>
 template <typename Steps>
-void Refinement<D>::Finish(VertexId v, const Assessment& found, int bucket, Steps& steps) {
+void Refinement<Domain>::Finish(VertexId v, const Assessment& found, int bucket, Steps& steps) {
   pending_.Remember(v, found, steps.NodesToWatch());
   if (!found.IsGood()) {
-    pending_.ScheduleLater(v, found, bucket, rules_->ClipRadius(EdgeLimitSq(bucket)));
+    pending_.ScheduleLater(v, found, bucket, step_rules_->ClipRadius(EdgeLimitSq(bucket)));
     return;
   }
   stars_.Write(v, steps.FindStar(stars_), structure_.vertex_count());
@@ -315,32 +290,29 @@ void Refinement<D>::Finish(VertexId v, const Assessment& found, int bucket, Step
 }
 
 // Inserts the vertex that is asked for, and makes it pending.
-template <int D>
-absl::StatusOr<VertexId> Refinement<D>::Insert(const InsertionRequest<D>& request) {
+template <typename Domain>
+absl::StatusOr<VertexId> Refinement<Domain>::Insert(const typename Domain::Request& request) {
   const SteinerPoint<D>& point = request.point;
   if (structure_.vertex_count() >= max_vertices_) {
     return TooManyVerticesError(max_vertices_);
   }
-  if (!rules_->IsLongEnough(point)) {
+  if (!step_rules_->IsLongEnough(point)) {
     return absl::ResourceExhaustedError(absl::StrCat("refinement came to an edge of length ",
                                                      std::sqrt(std::max(0.0, point.empty_radius_sq)),
                                                      ", below the smallest that double arithmetic serves here, ",
-                                                     min_edge_, "; raise rho = ", rules_->criteria().rho));
+                                                     min_edge_, "; raise rho = ", step_rules_->criteria().rho));
   }
   if constexpr (kChecks) {
     rounds_.CommitAdded();
-    checks_.CheckInsertion(*rules_, request);
+    checks_.CheckInsertion(*step_rules_, request.insertion, request.candidate, request.point,
+                           request.place.IsOnFeature());
   }
   Insertion insertion = request.insertion;
   insertion.vertex = structure_.AddUncommitted(insertion.near, point.position);
   if (!rounds_.IsRecording() || *observer_ || structure_.uncommitted_count() == QueryStructure<D>::kMostUncommitted) {
     rounds_.CommitAdded();
   }
-  if constexpr (D == 2) {
-    if (domain_ != nullptr) {
-      domain_->AddVertex(request.place.on, request.place.face);
-    }
-  }
+  domain_.Added(request.place);
   rounds_.NoteInserted(point.position);
   context_->SetVertices(structure_.vertex_count());
   AddPending(insertion.near, insertion.vertex, point.empty_radius_sq);
@@ -353,8 +325,8 @@ absl::StatusOr<VertexId> Refinement<D>::Insert(const InsertionRequest<D>& reques
 // Makes the new vertex `x`, which is near `near` and whose nearest neighbour is as near as it says, pending. Its
 // neighbours are not notified here but when x is first looked at, by RefineVertex; except where a vertex watches nodes
 // of a face that are not known.
-template <int D>
-void Refinement<D>::AddPending(VertexId near, VertexId x, double nearest_sq) {
+template <typename Domain>
+void Refinement<Domain>::AddPending(VertexId near, VertexId x, double nearest_sq) {
   pending_.Add(near, x, nearest_sq, [&](double radius) {
     Polytope<D>& cell = workspace_.other.cell;
     ComputeCell(x, CubeAround<D>(structure_.point(x), radius), workspace_.other);
@@ -363,16 +335,16 @@ void Refinement<D>::AddPending(VertexId near, VertexId x, double nearest_sq) {
       return;
     }
     const FaceMask faces = structure_.faces(x);
-    const Assessment found = Assess<D>(cell, faces, rules_->criteria(), nearest_sq);
+    const Assessment found = Assess<D>(cell, faces, step_rules_->criteria(), nearest_sq);
     workspace_.notices.clear();
-    rules_->AppendNotices(cell, faces, found, workspace_.notices);
+    step_rules_->AppendNotices(cell, faces, found, workspace_.notices);
     pending_.Notify(x, found, workspace_.notices);
   });
 }
 
 // Computes the cell of `v` among all vertices that have been added, not yet placed, clipped by `clip`.
-template <int D>
-void Refinement<D>::ComputeCell(VertexId v, const Box<D>& clip, Workspace<D>& workspace) {
+template <typename Domain>
+void Refinement<Domain>::ComputeCell(VertexId v, const Box<D>& clip, Workspace<D>& workspace) {
   structure_.UnplacedClippedVoronoi(v, clip, workspace);
   structure_.CutByUncommitted(v, workspace.cell);
   if (workspace.cell.IsTooLarge() && structure_.uncommitted_count() > 0) {
@@ -382,52 +354,49 @@ void Refinement<D>::ComputeCell(VertexId v, const Box<D>& clip, Workspace<D>& wo
 }
 
 // Tells now and then how far the run is, and asks for the memory that it has come to.
-template <int D>
-absl::Status Refinement<D>::CountRefined() {
+template <typename Domain>
+absl::Status Refinement<Domain>::CountRefined() {
   if (++refined_ % kReportInterval == 0) {
-    const uint64_t of_samples = SampleTree<D>::BytesFor(rules_->criteria().sizes.samples().size());
-    const uint64_t of_domain = domain_ == nullptr ? 0 : domain_->MemoryBytes();
-    WELLSPACE_RETURN_IF_ERROR(context_->AllowMemory(structure_.MemoryBytes() + MemoryBytes() + of_samples + of_domain));
+    const uint64_t of_samples = SampleTree<D>::BytesFor(step_rules_->criteria().sizes.samples().size());
+    WELLSPACE_RETURN_IF_ERROR(
+        context_->AllowMemory(structure_.MemoryBytes() + MemoryBytes() + of_samples + domain_.MemoryBytes()));
     context_->SetPhaseFraction(1 - static_cast<double>(pending_.schedule().size()) / structure_.vertex_count());
   }
   return absl::OkStatus();
 }
 
-template <int D>
-void Refinement<D>::VertexAdded(VertexId x) {
+template <typename Domain>
+void Refinement<Domain>::VertexAdded(VertexId x) {
   if (!pending_.HasBegun()) {
     return;  // the next run schedules all
   }
   Neighbor nearest = structure_.NearestNeighbor(x, workspace_.own);
-  if constexpr (D == 2) {
-    if (domain_ != nullptr) {
-      nearest.distance_sq = domain_rules_->NearestSegmentSq(x, nearest.distance_sq, workspace_.own);
-    }
-  }
+  nearest.distance_sq = rules_->NearestFeatureSq(x, nearest.distance_sq, workspace_.own);
   AddPending(nearest.vertex, x, nearest.distance_sq);
 }
 
-template <int D>
-void Refinement<D>::CellChanged(VertexId v, double nearest_sq) {
+template <typename Domain>
+void Refinement<Domain>::CellChanged(VertexId v, double nearest_sq) {
   stars_.GiveUp();
   pending_.CellChanged(v, nearest_sq);
 }
 
-template <int D>
-QueryCounters Refinement<D>::counters() const {
+template <typename Domain>
+QueryCounters Refinement<Domain>::counters() const {
   QueryCounters counters = workspace_.own.counters;
   counters.Add(workspace_.other.counters);
   return counters;
 }
 
-template <int D>
-uint64_t Refinement<D>::MemoryBytes() const {
+template <typename Domain>
+uint64_t Refinement<Domain>::MemoryBytes() const {
   return pending_.MemoryBytes() + stars_.MemoryBytes() + rounds_.MemoryBytes() +
          (workspace_.own.seen.size() + workspace_.other.seen.size()) * sizeof(uint32_t);
 }
 
-#define WELLSPACE_INSTANTIATE(D) template class Refinement<D>;
+#define WELLSPACE_INSTANTIATE(D) template class Refinement<BoxDomain<D>>;
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE
+template class Refinement<PlaneDomain>;
 
 }  // namespace wellspace::core

@@ -9,10 +9,9 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "core/base/run_context.h"
+#include "core/refine/box_domain.h"
 #include "core/refine/cell_steps.h"
 #include "core/refine/criteria.h"
-#include "core/refine/domain/domain_rules.h"
-#include "core/refine/domain/planar_domain.h"
 #include "core/refine/insertion.h"
 #include "core/refine/pending_vertices.h"
 #include "core/refine/refinement_checks.h"
@@ -38,24 +37,29 @@ using RefinementObserver = std::function<void(const QueryStructure<D>&, const In
 // run, maybe by another thread, while vertices are only read.
 using VertexPredictor = std::function<absl::StatusOr<uint64_t>()>;
 
-// The refinement of one structure, which may be run again: after an error, after vertices were added, for other
-// criteria. Built with WELLSPACE_CHECKS it asserts at each insertion what docs/design/guarantees.md promises of it, as
-// far as that can be seen nearby, and aborts with the figures.
+// The refinement of one structure in a domain, which may be run again: after an error, after vertices were added, for
+// other criteria. Domains are BoxDomain<D> and PlaneDomain; box_domain.h says what one has. Built with WELLSPACE_CHECKS
+// it asserts at each insertion what docs/design/guarantees.md promises of it, as far as that can be seen nearby, and
+// aborts with the figures.
 //
-// The parts: what has to be looked at (PendingVertices), what is wrong with a cell and what it asks for (CellSteps, by
-// StepRules), the loop (here), and what threads do ahead of it (Rounds).
+// The parts: what has to be looked at (PendingVertices), what is wrong with a cell and what it asks for (the domain's
+// Steps, by its Rules), the loop (here), and what threads do ahead of it (Rounds).
 //
 // Thread safety: thread-compatible.
 // Invariants: (1) every vertex is pending, or its cell meets the criteria of the last run, for as long as no vertex is
 //             added that VertexAdded is not told of.
-template <int D>
+template <typename Domain>
 class Refinement {
+  static_assert(RefinedDomain<Domain>);
+
  public:
-  // No vertex is added nearer than `min_edge` to another. In the plane `domain` may be what the points and segments of
-  // `structure` bound: then what is meshed of it takes the place of the box.
+  static constexpr int D = Domain::kDimension;
+
+  // No vertex is added nearer than `min_edge` to another. What is meshed of `domain` takes the place of the box.
   //
-  // REQUIRES:   structure and domain outlive this; the points of the domain are the vertices of the structure.
-  Refinement(QueryStructure<D>& structure, double min_edge, PlanarDomain* domain = nullptr);
+  // REQUIRES:   the structure, and what the domain is a handle of, outlive this; the domain's vertices are those of the
+  //             structure.
+  explicit Refinement(QueryStructure<D>& structure, double min_edge, Domain domain = Domain());
   Refinement(const Refinement&) = delete;
   Refinement& operator=(const Refinement&) = delete;
 
@@ -128,17 +132,16 @@ class Refinement {
   absl::Status Loop();
   absl::Status RefineShorterThan(int bucket);
   absl::Status RefineInRounds();
-  absl::Status RefineBatch(Batch<D>& batch);
-  absl::Status RefineNextOf(Batch<D>& batch);
-  bool IsNextStillValid(const Batch<D>& batch) const;
+  absl::Status RefineBatch(Batch<Domain>& batch);
+  absl::Status RefineNextOf(Batch<Domain>& batch);
+  bool IsNextStillValid(const Batch<Domain>& batch) const;
   absl::Status RefineTaken(VertexId v, int bucket);
   absl::Status RefineByCell(VertexId v, int bucket);
-  absl::Status RefineInDomain(VertexId v, int bucket);
   template <typename Steps>
   absl::Status RefineVertex(VertexId v, int bucket, Steps& steps);
   template <typename Steps>
   void Finish(VertexId v, const Assessment& found, int bucket, Steps& steps);
-  absl::StatusOr<VertexId> Insert(const InsertionRequest<D>& request);
+  absl::StatusOr<VertexId> Insert(const typename Domain::Request& request);
   void AddPending(VertexId near, VertexId x, double nearest_sq);
   void ComputeCell(VertexId v, const Box<D>& clip, Workspace<D>& workspace);
   absl::Status CountRefined();
@@ -146,15 +149,15 @@ class Refinement {
 
   QueryStructure<D>& structure_;
   const double min_edge_;
-  PlanarDomain* const domain_;  // null: the box
+  [[no_unique_address]] Domain domain_;
   PendingVertices<D> pending_;
   StarWriter<D> stars_;  // of vertices that are done, or have been
-  Rounds<D> rounds_;
+  Rounds<Domain> rounds_;
   StepWorkspace<D> workspace_;
 
   // Of the last run.
-  std::optional<StepRules<D>> rules_;
-  std::optional<DomainRules> domain_rules_;  // where there is a domain
+  std::optional<StepRules<D>> step_rules_;
+  std::optional<typename Domain::Rules> rules_;  // which refer to these
   uint64_t max_vertices_ = 0;
   uint64_t refined_ = 0;           // how often a vertex has been refined, in all runs
   RunContext* context_ = nullptr;  // valid until the run ends, as is the next
@@ -162,6 +165,10 @@ class Refinement {
 
   RefinementChecks<D> checks_;  // used in the checking build alone
 };
+
+// The refinement of a cloud.
+template <int D>
+using BoxRefinement = Refinement<BoxDomain<D>>;
 
 }  // namespace wellspace::core
 

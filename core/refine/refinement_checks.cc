@@ -40,8 +40,9 @@ void RefinementChecks<D>::CheckOrder(const Schedule& schedule, VertexId v, const
 }
 
 template <int D>
-void RefinementChecks<D>::CheckInsertion(const StepRules<D>& rules, const InsertionRequest<D>& request) {
-  const auto& [insertion, candidate, point, place] = request;
+void RefinementChecks<D>::CheckInsertion(const StepRules<D>& rules, const Insertion& insertion,
+                                         const SteinerPoint<D>& candidate, const SteinerPoint<D>& point,
+                                         bool is_on_feature) {
   const Box<D>& box = structure_.box();
   const double edge = std::sqrt(insertion.edge_sq);
   const double limit = std::sqrt(insertion.edge_limit_sq);
@@ -56,12 +57,7 @@ void RefinementChecks<D>::CheckInsertion(const StepRules<D>& rules, const Insert
   const double rounding = RoundingIn<D>(box);
   const double least = (encroaches ? 1 : rules.criteria().rho) * edge * (1 - kLengthRounding);
   const double most = std::sqrt(D) * rules.clip_factor() * limit * (1 + kLengthRounding) + rounding;
-  // The first split of a segment between small angles is in its middle third, however near to its end the vertex is.
-  bool may_be_far = false;
-  if constexpr (D == 2) {
-    may_be_far = place.on.IsOnSegment();
-  }
-  if (!(distance >= least && (distance <= most || may_be_far))) {
+  if (!(distance >= least && (distance <= most || is_on_feature))) {
     Require(false, which(), "it has to be from ", least, " to ", most);
   }
   if (!encroaches && !(edge <= limit * (1 + kLengthRounding))) {

@@ -8,6 +8,7 @@
 #include "core/cell/polytope.h"
 #include "core/refine/insertion.h"
 #include "core/refine/schedule.h"
+#include "core/refine/steiner_point.h"
 #include "core/refine/step_rules.h"
 #include "core/voronoi/query_structure.h"
 
@@ -29,10 +30,13 @@ class RefinementChecks {
   void CheckOrder(const Schedule& schedule, VertexId v, const Polytope<D>& cell, int bucket);
 
   // [HT08] Definition 1 at an insertion, before it is made: (1), that the edge is the bucket's, the place, and the
-  // empty ball.
+  // empty ball. `candidate` is the point before it was snapped to the boundary. A vertex on a feature may be farther
+  // from the one that asks than the others: the first split of a segment between small angles is in its middle third,
+  // however near to its end that one is.
   //
   // Complexity: that of a query.
-  void CheckInsertion(const StepRules<D>& rules, const InsertionRequest<D>& request);
+  void CheckInsertion(const StepRules<D>& rules, const Insertion& insertion, const SteinerPoint<D>& candidate,
+                      const SteinerPoint<D>& point, bool is_on_feature);
 
  private:
   const QueryStructure<D>& structure_;

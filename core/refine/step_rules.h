@@ -1,5 +1,5 @@
 // How a step follows from a cell: what is wrong with it, where a new vertex goes, and what its neighbours are to know.
-// CellSteps asks in each step of a vertex in the box; DomainRules takes clip and candidates from here.
+// CellSteps asks in each step of a vertex in the box; PlaneRules takes clip and candidates from here.
 #ifndef WELLSPACE_CORE_REFINE_STEP_RULES_H_
 #define WELLSPACE_CORE_REFINE_STEP_RULES_H_
 
@@ -36,6 +36,7 @@ class StepRules {
   StepRules(const QueryStructure<D>& structure, const MeshCriteria<D>& criteria, double min_edge);
 
   const MeshCriteria<D>& criteria() const { return criteria_; }
+  FaceMask FacesOf(VertexId v) const { return structure_.faces(v); }
 
   // A cell is clipped at so many times the longest edge of its bucket.
   double clip_factor() const { return clip_factor_; }

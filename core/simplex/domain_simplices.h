@@ -13,7 +13,7 @@
 #include "absl/status/statusor.h"
 #include "core/base/memory/huge_pages.h"
 #include "core/base/run_context.h"
-#include "core/refine/domain/planar_domain.h"
+#include "core/refine/plane/planar_domain.h"
 #include "core/simplex/simplices.h"
 #include "core/voronoi/query_structure.h"
 #include "core/voronoi/star_lists.h"

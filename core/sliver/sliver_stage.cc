@@ -103,7 +103,7 @@ class WorstSoFar {
 // Has structure and refinement follow the triangulation step by step, so that repair may end after any of them.
 class Follower final : public RepairObserver {
  public:
-  Follower(Triangulation<3>& triangulation, QueryStructure<3>& structure, Refinement<3>& refinement,
+  Follower(Triangulation<3>& triangulation, QueryStructure<3>& structure, BoxRefinement<3>& refinement,
            std::vector<bool>& moved)
       : triangulation_(triangulation), structure_(structure), refinement_(refinement), moved_(moved) {}
 
@@ -135,7 +135,7 @@ class Follower final : public RepairObserver {
  private:
   Triangulation<3>& triangulation_;
   QueryStructure<3>& structure_;
-  Refinement<3>& refinement_;
+  BoxRefinement<3>& refinement_;
   std::vector<bool>& moved_;
   std::vector<SimplexId> star_;
 };
@@ -207,7 +207,7 @@ absl::Status SliverStage<D>::FollowStructure(const QueryStructure<D>& structure,
 
 template <int D>
 template <int E>
-absl::Status SliverStage<D>::Repair(QueryStructure<E>& structure, Refinement<E>& refinement,
+absl::Status SliverStage<D>::Repair(QueryStructure<E>& structure, BoxRefinement<E>& refinement,
                                     std::vector<bool>& is_fixed, const RepairCriteria& criteria,
                                     std::vector<bool>& moved, int threads, RunContext& context) requires(E == 3) {
   const Stopwatch stopwatch(statistics_.seconds, statistics_.star_seconds);
@@ -283,7 +283,7 @@ template class SliverStage<3>;
 template class SliverStage<4>;
 template class SliverStage<5>;
 template class SliverStage<6>;
-template absl::Status SliverStage<3>::Repair(QueryStructure<3>&, Refinement<3>&, std::vector<bool>&,
+template absl::Status SliverStage<3>::Repair(QueryStructure<3>&, BoxRefinement<3>&, std::vector<bool>&,
                                              const RepairCriteria&, std::vector<bool>&, int, RunContext&);
 
 }  // namespace wellspace::core

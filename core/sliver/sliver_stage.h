@@ -61,7 +61,7 @@ class SliverStage {
   // Threads:    uses `threads` for the stars that the triangulation is made of.
   // A template, since clang 14 would instantiate it in other dimensions otherwise.
   template <int E = D>
-  absl::Status Repair(QueryStructure<E>& structure, Refinement<E>& refinement, std::vector<bool>& is_fixed,
+  absl::Status Repair(QueryStructure<E>& structure, BoxRefinement<E>& refinement, std::vector<bool>& is_fixed,
                       const RepairCriteria& criteria, std::vector<bool>& moved, int threads,
                       RunContext& context) requires(E == 3);
 

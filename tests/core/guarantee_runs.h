@@ -89,7 +89,7 @@ Outcome RefineInput(const Input<D>& input, const core::MeshCriteria<D>& criteria
     begin(structure);
   }
   const double budget = multiple * static_cast<double>(outcome.before + outcome.leaves);
-  core::Refinement<D> refinement(structure, LeastSeparation<D>(input.box) / 16);
+  core::BoxRefinement<D> refinement(structure, LeastSeparation<D>(input.box) / 16);
   outcome.status = refinement.Run(criteria, static_cast<uint64_t>(budget), 2, context, observer);
   outcome.vertices = structure.vertex_count();
   return outcome;

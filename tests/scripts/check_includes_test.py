@@ -17,9 +17,9 @@ SOUND = {
     "core/cell/polytope.h": '#include "core/geometry/point.h"\n',
     "core/voronoi/star.h": '#include "core/cell/polytope.h"\n',
     "core/refine/rules.h": '#include "core/voronoi/star.h"\n',
-    "core/refine/domain/planar.h": '#include "core/refine/rules.h"\n',
-    "core/refine/speculation/rounds.h": '#include "core/refine/domain/planar.h"\n',
-    "core/refine/refine.h": '#include "core/refine/domain/planar.h"\n#include "core/refine/speculation/rounds.h"\n',
+    "core/refine/plane/planar.h": '#include "core/refine/rules.h"\n',
+    "core/refine/speculation/rounds.h": '#include "core/refine/plane/planar.h"\n',
+    "core/refine/refine.h": '#include "core/refine/plane/planar.h"\n#include "core/refine/speculation/rounds.h"\n',
     "server/sessions/session.h": '#include "server/base/options.h"\n',
     "server/base/options.h": "#include <memory>\n",
     "core/mesher.h": '#include "core/simplex/star.h"\n',
@@ -75,12 +75,12 @@ class CheckIncludesTest(unittest.TestCase):
 
     def test_parts_of_the_refinement_include_what_is_above_them(self):
         for path, header in (
-            ("core/refine/rules.h", "domain/planar.h"),
+            ("core/refine/rules.h", "plane/planar.h"),
             ("core/refine/rules.h", "speculation/rounds.h"),
-            ("core/refine/domain/planar.h", "speculation/rounds.h"),
+            ("core/refine/plane/planar.h", "speculation/rounds.h"),
         ):
             self.assert_found(path, f'#include "core/refine/{header}"', "may include only")
-        for path in ("core/refine/rules.h", "core/refine/domain/planar.h", "core/refine/speculation/rounds.h"):
+        for path in ("core/refine/rules.h", "core/refine/plane/planar.h", "core/refine/speculation/rounds.h"):
             self.assert_found(path, '#include "core/refine/refine.h"', "stands above")
 
     def test_core_includes_server(self):

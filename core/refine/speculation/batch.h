@@ -29,8 +29,10 @@ namespace wellspace::core {
 // from and were inserted but not expected, or expected but not inserted.
 //
 // Thread safety: thread-compatible. All but the records is written by the thread that refines alone.
-template <int D>
+template <typename Domain>
 struct alignas(kCacheLines) Batch {
+  static constexpr int D = Domain::kDimension;
+
   bool IsRefined() const { return refined == vertices.size(); }
   // The first vertex that has not been refined.
   VertexId next() const { return vertices[refined]; }
@@ -99,7 +101,7 @@ struct alignas(kCacheLines) Batch {
   std::vector<VertexId> vertices;
   size_t refined = 0;  // so many of the vertices, the first
 
-  BatchRecords<D> records;
+  BatchRecords<Domain> records;
   Star<D> written;           // simplices of the batch before, which may still be read
   size_t first_unknown = 0;  // of what is inserted in these rounds, the first that the records were made without
 

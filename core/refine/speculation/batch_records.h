@@ -36,8 +36,11 @@ struct RecordedStep {
 //
 // Thread safety: thread-compatible. From Rounds::Prepare until `is_speculated` it belongs to the threads that record,
 // which write nothing else of a batch; before and after that to the one that refines.
-template <int D>
+template <typename Domain>
 struct BatchRecords {
+  static constexpr int D = Domain::kDimension;
+  using Request = typename Domain::Request;
+
   // How long the columns are.
   struct Ends {
     uint32_t steps = 0;
@@ -112,7 +115,7 @@ struct BatchRecords {
   Ends EndOf(size_t at) const { return at + 1 < by_vertex.size() ? by_vertex[at + 1].begin : ends(); }
 
   // What the record of vertex `at` asks for.
-  std::span<const InsertionRequest<D>> RequestsOf(size_t at) const {
+  std::span<const Request> RequestsOf(size_t at) const {
     const uint32_t begin = by_vertex[at].begin.requests;
     return std::span(requests).subspan(begin, EndOf(at).requests - begin);
   }
@@ -143,7 +146,7 @@ struct BatchRecords {
 
   std::vector<Record> by_vertex;
   std::vector<RecordedStep> steps;
-  std::vector<InsertionRequest<D>> requests;
+  std::vector<Request> requests;
   ExtraVertices<D> inserted;  // by request
   std::vector<Assessment> reassessed;
   std::vector<NeighborNotice> notices;

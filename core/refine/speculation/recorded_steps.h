@@ -22,13 +22,15 @@ namespace wellspace::core {
 // can be done once.
 //
 // Thread safety: thread-compatible.
-template <int D>
+template <typename Domain>
 class RecordedSteps {
+  static constexpr int D = Domain::kDimension;
+
  public:
   // The steps of the next vertex of `batch`.
   //
   // REQUIRES:   its record is still valid; the batch outlives this.
-  explicit RecordedSteps(Batch<D>& batch)
+  explicit RecordedSteps(Batch<Domain>& batch)
       : batch_(batch),
         record_(batch.records.by_vertex[batch.refined]),
         end_(batch.records.EndOf(batch.refined)),
@@ -49,7 +51,7 @@ class RecordedSteps {
 
   std::span<const NeighborNotice> Notices() const { return notices_; }
 
-  const InsertionRequest<D>* NextRequest() {
+  const typename Domain::Request* NextRequest() {
     RecordedStep& step = batch_.records.steps[step_];
     if (step.is_reassessed) {
       step.found = batch_.records.reassessed[reassessed_++];
@@ -57,7 +59,7 @@ class RecordedSteps {
     if (!step.asks) {
       return nullptr;
     }
-    InsertionRequest<D>& request = batch_.records.requests[request_];
+    typename Domain::Request& request = batch_.records.requests[request_];
     batch_.Renumber(request.insertion.other);
     return &request;
   }
@@ -83,9 +85,9 @@ class RecordedSteps {
   }
 
  private:
-  Batch<D>& batch_;
-  const typename BatchRecords<D>::Record& record_;
-  const typename BatchRecords<D>::Ends end_;
+  Batch<Domain>& batch_;
+  const typename BatchRecords<Domain>::Record& record_;
+  const typename BatchRecords<Domain>::Ends end_;
   size_t step_;     // of the batch's
   size_t request_;  // likewise, the next
   size_t reassessed_;

@@ -10,9 +10,8 @@
 #include "absl/cleanup/cleanup.h"
 #include "core/base/dimensions.h"
 #include "core/base/memory/prefetch.h"
-#include "core/refine/domain/domain_rules.h"
-#include "core/refine/domain/domain_steps.h"
-#include "core/refine/domain/expected_vertices.h"
+#include "core/refine/box_domain.h"
+#include "core/refine/plane/plane_domain.h"
 #include "core/refine/rounding.h"
 
 namespace wellspace::core {
@@ -20,9 +19,6 @@ namespace {
 
 // Fewer vertices of a bucket are refined as they come.
 constexpr size_t kLeastInRounds = 64;
-// In a domain of few vertices, where turns among strips make more: neighbours along a curve fit worse.
-constexpr size_t kLeastInSmallDomain = 4096;
-constexpr uint32_t kSmallDomain = 32768;
 // A bucket is cut into so many strips, and so many vertices of each are a batch.
 constexpr size_t kStrips = 8;
 constexpr size_t kBatch = 128;
@@ -36,10 +32,12 @@ constexpr size_t kMoreThanDistrusted = 4;
 
 // Cells of the vertices that were in the structure when speculation began, and of those that the batch expects to be
 // inserted before. Notes in the record how far they reach.
-template <int D>
+template <typename Domain>
 class SpeculatedCells {
  public:
-  SpeculatedCells(const QueryStructure<D>& structure, Batch<D>& batch, size_t at)
+  static constexpr int D = Domain::kDimension;
+
+  SpeculatedCells(const QueryStructure<D>& structure, Batch<Domain>& batch, size_t at)
       : structure_(structure),
         inserted_(batch.records.inserted),
         record_(batch.records.by_vertex[at]),
@@ -74,25 +72,23 @@ class SpeculatedCells {
  private:
   const QueryStructure<D>& structure_;
   const ExtraVertices<D>& inserted_;
-  typename BatchRecords<D>::Record& record_;
+  typename BatchRecords<Domain>::Record& record_;
   const Point<D> site_;
   bool is_known_ = true;
 };
 
 }  // namespace
 
-template <int D>
-void Rounds<D>::BeginRun(const StepRules<D>& rules, const PlanarDomain* domain, ThreadTeam& team,
-                         const RunContext& context) {
+template <typename Domain>
+void Rounds<Domain>::BeginRun(const StepRules<D>& rules, ThreadTeam& team, const RunContext& context) {
   rules_ = &rules;
-  domain_ = domain;
   team_ = &team;
   context_ = &context;
   distrusted_size_ = 0;
 }
 
-template <int D>
-void Rounds<D>::EndRun(QueryCounters& counters) {
+template <typename Domain>
+void Rounds<Domain>::EndRun(QueryCounters& counters) {
   AwaitOthers();
   stars_.WriteLast();
   finished_ = {};
@@ -104,8 +100,8 @@ void Rounds<D>::EndRun(QueryCounters& counters) {
   team_ = nullptr;
 }
 
-template <int D>
-void Rounds<D>::DropRun() {
+template <typename Domain>
+void Rounds<Domain>::DropRun() {
   if (is_recording_ || stars_.IsWriting()) {
     team_->Drop();
     is_recording_ = false;
@@ -114,11 +110,10 @@ void Rounds<D>::DropRun() {
   team_ = nullptr;
 }
 
-template <int D>
-bool Rounds<D>::Begin(int bucket) {
+template <typename Domain>
+bool Rounds<Domain>::Begin(int bucket) {
   Schedule& schedule = pending_.schedule();
-  const bool is_small_domain = domain_ != nullptr && structure_.vertex_count() < kSmallDomain;
-  const size_t least = is_small_domain ? kLeastInSmallDomain : kLeastInRounds;
+  const size_t least = domain_.LeastInRounds(kLeastInRounds, structure_.vertex_count());
   if (schedule.MostIn(bucket) < least) {
     return false;
   }
@@ -146,8 +141,8 @@ bool Rounds<D>::Begin(int bucket) {
 }
 
 // Makes the next vertices of a strip its batch.
-template <int D>
-void Rounds<D>::TakeNext(Batch<D>& batch) {
+template <typename Domain>
+void Rounds<Domain>::TakeNext(Batch<Domain>& batch) {
   const size_t size = std::min(kBatch, batch.strip_end - batch.strip_begin);
   batch.vertices.assign(detached_.rend() - static_cast<std::ptrdiff_t>(batch.strip_end),
                         detached_.rend() - static_cast<std::ptrdiff_t>(batch.strip_end - size));
@@ -156,15 +151,15 @@ void Rounds<D>::TakeNext(Batch<D>& batch) {
   batch.records.is_speculated = false;
 }
 
-template <int D>
-void Rounds<D>::ReattachAll() {
+template <typename Domain>
+void Rounds<Domain>::ReattachAll() {
   Schedule& schedule = pending_.schedule();
   const auto reattach = [&](VertexId v) {
     if (schedule.IsPendingIn(v, bucket_)) {
       schedule.Reattach(v, bucket_);
     }
   };
-  for (const Batch<D>& batch : batches_) {
+  for (const Batch<Domain>& batch : batches_) {
     const auto begin = detached_.begin();
     std::for_each(begin + static_cast<std::ptrdiff_t>(batch.strip_begin),
                   begin + static_cast<std::ptrdiff_t>(batch.strip_end), reattach);
@@ -175,34 +170,34 @@ void Rounds<D>::ReattachAll() {
   detached_ = {};
 }
 
-template <int D>
-void Rounds<D>::ForgetRecords() {
-  for (Batch<D>& batch : batches_) {
+template <typename Domain>
+void Rounds<Domain>::ForgetRecords() {
+  for (Batch<Domain>& batch : batches_) {
     batch.records.is_speculated = false;
   }
 }
 
-template <int D>
-void Rounds<D>::BeginRound() {
+template <typename Domain>
+void Rounds<Domain>::BeginRound() {
   next_batch_ = 0;
   if (team_->threads() > 1) {
     Speculate();
   }
 }
 
-template <int D>
-Batch<D>* Rounds<D>::NextBatch() {
-  const std::span<Batch<D>> now = HalfOf(0);
+template <typename Domain>
+Batch<Domain>* Rounds<Domain>::NextBatch() {
+  const std::span<Batch<Domain>> now = HalfOf(0);
   if (next_batch_ < now.size()) {
     return &now[next_batch_++];
   }
-  const std::span<Batch<D>> then = HalfOf(1);
+  const std::span<Batch<Domain>> then = HalfOf(1);
   if (next_batch_ == now.size() + then.size()) {
     return nullptr;
   }
   while (is_recording_ && team_->Help()) {
   }
-  Batch<D>& batch = then[next_batch_ - now.size()];
+  Batch<Domain>& batch = then[next_batch_ - now.size()];
   if (!is_recording_ || team_->HasEnded() ||
       !std::atomic_ref(batch.records.is_speculated).load(std::memory_order_acquire)) {
     return nullptr;
@@ -214,10 +209,10 @@ Batch<D>* Rounds<D>::NextBatch() {
 // In small buckets, and where there are few blocks, batches that are refined at about the same time may be near each
 // other, so that many records conflict: there it is not worth while. What queries read does not change until
 // CommitAdded.
-template <int D>
-void Rounds<D>::Speculate() {
-  const std::span<Batch<D>> now = HalfOf(0);
-  const std::span<Batch<D>> then = HalfOf(1);
+template <typename Domain>
+void Rounds<Domain>::Speculate() {
+  const std::span<Batch<Domain>> now = HalfOf(0);
+  const std::span<Batch<Domain>> then = HalfOf(1);
   if (detached_.size() <= kMoreThanDistrusted * distrusted_size_) {
     notes_insertions_ = now.front().records.is_speculated;
     stars_.SetCollecting(notes_insertions_);
@@ -228,7 +223,7 @@ void Rounds<D>::Speculate() {
   }
   stars_.BeginCollecting();
   workspaces_.resize(team_->threads());
-  const auto record = [this](Batch<D>& batch, size_t part, size_t parts) {
+  const auto record = [this](Batch<Domain>& batch, size_t part, size_t parts) {
     RecordPart(batch, part, parts, workspaces_[ThreadTeam::CurrentThread()]);
   };
   if (!now.front().records.is_speculated) {
@@ -243,26 +238,26 @@ void Rounds<D>::Speculate() {
   team_->Begin(parts * then.size(), [=](size_t i) { record(then[i % then.size()], i / then.size(), parts); });
 }
 
-template <int D>
-void Rounds<D>::Prepare(std::span<Batch<D>> batches) {
+template <typename Domain>
+void Rounds<Domain>::Prepare(std::span<Batch<Domain>> batches) {
   const Schedule& schedule = pending_.schedule();
-  for (Batch<D>& batch : batches) {
+  for (Batch<Domain>& batch : batches) {
     for (const VertexId v : batch.vertices) {
       schedule.Prefetch(v);
     }
     batch.Prepare(structure_.vertex_count(), inserted_before_ + inserted_.size());
     for (size_t i = batch.refined; i < batch.vertices.size(); ++i) {
       batch.records.by_vertex[i].is_wanted = schedule.IsPendingIn(batch.vertices[i], bucket_);
-      batch.records.by_vertex[i].has_to_notify = domain_ == nullptr || pending_.HasToNotify(batch.vertices[i]);
+      batch.records.by_vertex[i].has_to_notify = !Domain::kNotifiesAll || pending_.HasToNotify(batch.vertices[i]);
     }
   }
 }
 
 // Makes the records of one of equal parts of the vertices of a batch that have not been refined, once the parts before
 // it are done. Nothing but the records and the workspace is written.
-template <int D>
-void Rounds<D>::RecordPart(Batch<D>& batch, size_t part, size_t parts, StepWorkspace<D>& workspace) const {
-  BatchRecords<D>& records = batch.records;
+template <typename Domain>
+void Rounds<Domain>::RecordPart(Batch<Domain>& batch, size_t part, size_t parts, StepWorkspace<D>& workspace) const {
+  BatchRecords<Domain>& records = batch.records;
   const std::atomic_ref parts_done(records.parts_done);
   while (parts_done.load(std::memory_order_acquire) < part) {
     std::this_thread::yield();
@@ -288,27 +283,15 @@ void Rounds<D>::RecordPart(Batch<D>& batch, size_t part, size_t parts, StepWorks
 
 // Records the steps of vertex `at`: the loop of Refinement::RefineVertex, but each step is recorded in the place of
 // being done. Returns before the last step, and the record is not known, where that is an error, or depends on what is.
-template <int D>
-void Rounds<D>::Record(Batch<D>& batch, size_t at, StepWorkspace<D>& workspace) const {
+template <typename Domain>
+void Rounds<Domain>::Record(Batch<Domain>& batch, size_t at, StepWorkspace<D>& workspace) const {
   const VertexId v = batch.vertices[at];
-  SpeculatedCells<D> cells(structure_, batch, at);
-  const double edge_limit_sq = pending_.schedule().UpperLengthSq(bucket_);
-  if constexpr (D == 2) {
-    if (domain_ != nullptr) {
-      const ExpectedVertices expected(batch.records.inserted, batch.records.requests);
-      const DomainRules rules(structure_, *domain_, *rules_, &expected);
-      DomainSteps steps(rules, *rules_, v, edge_limit_sq, cells, workspace);
-      return RecordSteps(batch, at, cells, steps);
-    }
-  }
-  CellSteps<D, SpeculatedCells<D>> steps(*rules_, v, structure_.faces(v), edge_limit_sq, cells, workspace);
-  RecordSteps(batch, at, cells, steps);
-}
-
-template <int D>
-template <typename Cells, typename Steps>
-void Rounds<D>::RecordSteps(Batch<D>& batch, size_t at, Cells& cells, Steps& steps) const {
-  BatchRecords<D>& records = batch.records;
+  SpeculatedCells<Domain> cells(structure_, batch, at);
+  const typename Domain::Expected expected(batch.records.inserted, batch.records.requests);
+  const typename Domain::Rules rules = domain_.RulesFor(structure_, *rules_, &expected);
+  typename Domain::template Steps<SpeculatedCells<Domain>> steps(rules, v, pending_.schedule().UpperLengthSq(bucket_),
+                                                                 cells, workspace);
+  BatchRecords<Domain>& records = batch.records;
   while (!context_->IsCancelled()) {
     const Assessment* const found = steps.Assess();
     if (found == nullptr) {
@@ -320,7 +303,7 @@ void Rounds<D>::RecordSteps(Batch<D>& batch, size_t at, Cells& cells, Steps& ste
       steps.AppendNotices(records.notices);
     }
     step.notices = static_cast<uint32_t>(records.notices.size() - first_notice);
-    const InsertionRequest<D>* const request = steps.NextRequest();
+    const typename Domain::Request* const request = steps.NextRequest();
     if (!cells.IsKnown()) {
       return;
     }
@@ -336,13 +319,13 @@ void Rounds<D>::RecordSteps(Batch<D>& batch, size_t at, Cells& cells, Steps& ste
         steps.FindStar(records.star);
         records.AppendStar(at);
       }
-      records.SetKnown(at, structure_.point(batch.vertices[at]));
+      records.SetKnown(at, structure_.point(v));
       return;
     }
     if (!rules_->IsLongEnough(request->point)) {
       return;
     }
-    if (domain_ != nullptr) {
+    if constexpr (Domain::kAsksForDistances) {
       cells.NoteBall(request->point.position, kBeyond * request->point.empty_radius_sq);
     }
     records.requests.push_back(*request);
@@ -350,46 +333,46 @@ void Rounds<D>::RecordSteps(Batch<D>& batch, size_t at, Cells& cells, Steps& ste
   }
 }
 
-template <int D>
-void Rounds<D>::EndRound() {
+template <typename Domain>
+void Rounds<Domain>::EndRound() {
   AwaitOthers();
   notes_insertions_ = false;
   if (speculated_count_ >= kLeastInRounds && valid_count_ < kLeastShareValid * static_cast<double>(speculated_count_)) {
     distrusted_size_ = detached_.size();
   }
-  for (Batch<D>& batch : HalfOf(0)) {
+  for (Batch<Domain>& batch : HalfOf(0)) {
     std::swap(batch.records.simplices, batch.written);
   }
   stars_.BeginWriting(*team_);
   structure_.CommitAll();
   // The records of the next batches may have been made without what has been inserted meanwhile.
-  const Batch<D>& next = HalfOf(1).front();
+  const Batch<Domain>& next = HalfOf(1).front();
   const size_t is_known = next.records.is_speculated ? next.first_unknown - inserted_before_ : inserted_.size();
   inserted_.erase(inserted_.begin(), inserted_.begin() + static_cast<std::ptrdiff_t>(is_known));
   inserted_before_ += is_known;
 }
 
-template <int D>
-void Rounds<D>::NextRound() {
-  for (Batch<D>& batch : HalfOf(0)) {
+template <typename Domain>
+void Rounds<Domain>::NextRound() {
+  for (Batch<Domain>& batch : HalfOf(0)) {
     TakeNext(batch);
   }
   half_ = 1 - half_;
-  if (std::all_of(batches_.begin(), batches_.end(), [](const Batch<D>& batch) { return batch.IsLast(); })) {
+  if (std::all_of(batches_.begin(), batches_.end(), [](const Batch<Domain>& batch) { return batch.IsLast(); })) {
     finished_ = std::exchange(batches_, {});
     detached_ = {};
   }
 }
 
-template <int D>
-void Rounds<D>::BeginBatch(Batch<D>& batch) {
+template <typename Domain>
+void Rounds<Domain>::BeginBatch(Batch<Domain>& batch) {
   if (batch.records.is_speculated) {
     batch.BeginReplay(InsertedFrom(batch.first_unknown - inserted_before_));
   }
 }
 
-template <int D>
-void Rounds<D>::Prefetch(const Batch<D>& batch) const {
+template <typename Domain>
+void Rounds<Domain>::Prefetch(const Batch<Domain>& batch) const {
   PrefetchAhead(std::span(batch.vertices), batch.refined, [&](VertexId v, int step) {
     if (step == 0) {
       pending_.Prefetch(v);
@@ -401,8 +384,8 @@ void Rounds<D>::Prefetch(const Batch<D>& batch) const {
   });
 }
 
-template <int D>
-void Rounds<D>::AwaitOthers() {
+template <typename Domain>
+void Rounds<Domain>::AwaitOthers() {
   if (is_recording_ || stars_.IsWriting()) {
     team_->End();
     is_recording_ = false;
@@ -410,17 +393,17 @@ void Rounds<D>::AwaitOthers() {
   }
 }
 
-template <int D>
-void Rounds<D>::CommitAdded() {
+template <typename Domain>
+void Rounds<Domain>::CommitAdded() {
   AwaitOthers();
   structure_.CommitAll();
 }
 
-template <int D>
-uint64_t Rounds<D>::CountBytes() const {
+template <typename Domain>
+uint64_t Rounds<Domain>::CountBytes() const {
   uint64_t bytes = detached_.size() * sizeof(VertexId);
   for (const auto* batches : {&batches_, &finished_}) {
-    for (const Batch<D>& batch : *batches) {
+    for (const Batch<Domain>& batch : *batches) {
       bytes += batch.MemoryBytes();
     }
   }
@@ -430,8 +413,9 @@ uint64_t Rounds<D>::CountBytes() const {
   return bytes;
 }
 
-#define WELLSPACE_INSTANTIATE(D) template class Rounds<D>;
+#define WELLSPACE_INSTANTIATE(D) template class Rounds<BoxDomain<D>>;
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE
+template class Rounds<PlaneDomain>;
 
 }  // namespace wellspace::core

@@ -13,7 +13,6 @@
 #include "core/base/thread_team.h"
 #include "core/geometry/point.h"
 #include "core/refine/cell_steps.h"
-#include "core/refine/domain/planar_domain.h"
 #include "core/refine/pending_vertices.h"
 #include "core/refine/speculation/batch.h"
 #include "core/refine/star_writer.h"
@@ -38,7 +37,7 @@ struct SpeculationCounts {
 //   if (rounds.Begin(bucket))
 //     while (!rounds.AreDone()) {
 //       rounds.BeginRound();
-//       while (Batch<D>* batch = rounds.NextBatch()) … refine its vertices …
+//       while (Batch<Domain>* batch = rounds.NextBatch()) … refine its vertices …
 //       rounds.EndRound();
 //       rounds.NextRound();
 //     }
@@ -71,16 +70,18 @@ struct SpeculationCounts {
 // Thread safety: thread-compatible.
 // Invariants: (1) while IsRecording, other threads read the structure, and write nothing but the records of the next
 //             round's batches.
-template <int D>
+template <typename Domain>
 class Rounds {
  public:
-  // REQUIRES:   all of these outlive this.
-  Rounds(QueryStructure<D>& structure, PendingVertices<D>& pending, StarWriter<D>& stars)
-      : structure_(structure), pending_(pending), stars_(stars) {}
+  static constexpr int D = Domain::kDimension;
 
-  // Begins a run, which speculates with the threads of `team`, in `domain` if there is one. EndRun or DropRun has to be
-  // called before one of these goes; DropRun may be called after EndRun, and does nothing then.
-  void BeginRun(const StepRules<D>& rules, const PlanarDomain* domain, ThreadTeam& team, const RunContext& context);
+  // REQUIRES:   all of these outlive this.
+  Rounds(QueryStructure<D>& structure, const Domain& domain, PendingVertices<D>& pending, StarWriter<D>& stars)
+      : structure_(structure), domain_(domain), pending_(pending), stars_(stars) {}
+
+  // Begins a run, which speculates with the threads of `team`. EndRun or DropRun has to be called before one of these
+  // goes; DropRun may be called after EndRun, and does nothing then.
+  void BeginRun(const StepRules<D>& rules, ThreadTeam& team, const RunContext& context);
   // Writes the stars that are left, and adds to `counters` what the queries of other threads have cost.
   void EndRun(QueryCounters& counters);
   // Ends a run in which something has been thrown.
@@ -102,16 +103,16 @@ class Rounds {
   void BeginRound();
   // The next batch to be refined; null at the end of the round. Where other threads are at the last of the next round,
   // its first batches come, too.
-  Batch<D>* NextBatch();
+  Batch<Domain>* NextBatch();
   // Ends the speculation, commits what was added, and has another thread write stars.
   void EndRound();
   // Goes on to the next round, with new batches in the place of those that have been refined.
   void NextRound();
 
   // Begins to refine `batch`.
-  void BeginBatch(Batch<D>& batch);
+  void BeginBatch(Batch<Domain>& batch);
   // Asks the memory for what refining the next vertices of `batch` reads.
-  void Prefetch(const Batch<D>& batch) const;
+  void Prefetch(const Batch<Domain>& batch) const;
   // Notes that a vertex has been added at `p`.
   void NoteInserted(const Point<D>& p) {
     if (notes_insertions_) {
@@ -122,7 +123,7 @@ class Rounds {
   size_t inserted_count() const { return inserted_.size(); }
   std::span<const Point<D>> InsertedFrom(size_t i) const { return std::span(inserted_).subspan(i); }
   // Counts the record of a vertex of `batch` that is refined, for the decision whether to go on speculating.
-  void CountRecord(const Batch<D>& batch, bool was_valid) {
+  void CountRecord(const Batch<Domain>& batch, bool was_valid) {
     speculated_count_ += batch.records.is_speculated ? 1 : 0;
     valid_count_ += was_valid ? 1 : 0;
     counts_.speculated += batch.records.is_speculated ? 1 : 0;
@@ -143,30 +144,29 @@ class Rounds {
 
  private:
   // The batches of the round, for 0, or of the next one.
-  std::span<Batch<D>> HalfOf(size_t next) {
+  std::span<Batch<Domain>> HalfOf(size_t next) {
     return std::span(batches_).subspan((half_ ^ next) * batches_.size() / 2, batches_.size() / 2);
   }
-  void TakeNext(Batch<D>& batch);
+  void TakeNext(Batch<Domain>& batch);
   void Speculate();
-  void Prepare(std::span<Batch<D>> batches);
-  void RecordPart(Batch<D>& batch, size_t part, size_t parts, StepWorkspace<D>& workspace) const;
-  void Record(Batch<D>& batch, size_t at, StepWorkspace<D>& workspace) const;
-  template <typename Cells, typename Steps>
-  void RecordSteps(Batch<D>& batch, size_t at, Cells& cells, Steps& steps) const;
+  void Prepare(std::span<Batch<Domain>> batches);
+  void RecordPart(Batch<Domain>& batch, size_t part, size_t parts, StepWorkspace<D>& workspace) const;
+  void Record(Batch<Domain>& batch, size_t at, StepWorkspace<D>& workspace) const;
   uint64_t CountBytes() const;
 
   QueryStructure<D>& structure_;
+  const Domain& domain_;
   PendingVertices<D>& pending_;
   StarWriter<D>& stars_;
 
   // Of the detached vertices.
   int bucket_ = -1;
-  HugeVector<VertexId> detached_;   // the last of each strip is the next
-  std::vector<Batch<D>> batches_;   // by strip, the next of each; none if no vertex is detached
-  std::vector<Batch<D>> finished_;  // of the bucket before, whose stars may still be written
-  size_t half_ = 0;                 // whether this round is of the first half of the strips, or of the second
-  size_t next_batch_ = 0;           // in this round and the next
-  std::vector<Point<D>> inserted_;  // in these rounds, where they are speculated, from inserted_before_ on
+  HugeVector<VertexId> detached_;        // the last of each strip is the next
+  std::vector<Batch<Domain>> batches_;   // by strip, the next of each; none if no vertex is detached
+  std::vector<Batch<Domain>> finished_;  // of the bucket before, whose stars may still be written
+  size_t half_ = 0;                      // whether this round is of the first half of the strips, or of the second
+  size_t next_batch_ = 0;                // in this round and the next
+  std::vector<Point<D>> inserted_;       // in these rounds, where they are speculated, from inserted_before_ on
   size_t inserted_before_ = 0;
   size_t speculated_count_ = 0;  // of the vertices of the bucket that have been refined, how many had been recorded
   size_t valid_count_ = 0;       // and how many of these records were still valid
@@ -175,8 +175,7 @@ class Rounds {
 
   // Of the run.
   const StepRules<D>* rules_ = nullptr;
-  const PlanarDomain* domain_ = nullptr;  // null: the box
-  ThreadTeam* team_ = nullptr;            // null between runs
+  ThreadTeam* team_ = nullptr;  // null between runs
   const RunContext* context_ = nullptr;
   std::vector<StepWorkspace<D>> workspaces_;  // by thread
   bool is_recording_ = false;

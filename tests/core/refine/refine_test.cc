@@ -50,7 +50,7 @@ Parameters Defaults() {
 template <int D>
 absl::Status Refine(const Parameters& parameters, QueryStructure<D>& structure, RunContext& context,
                     const RefinementObserver<D>& observer = nullptr) {
-  Refinement<D> refinement(structure, parameters.min_edge);
+  BoxRefinement<D> refinement(structure, parameters.min_edge);
   return refinement.Run({.rho = parameters.rho}, parameters.max_vertices, 2, context, observer);
 }
 
@@ -224,7 +224,7 @@ TYPED_TEST(RefineTest, WhatWasStoppedEndsAsIfItHadNotBeen) {
     QueryStructure<D> at_once = MakeStructure<D>(cloud);
     ASSERT_TRUE(RefineQuietly<D>(Defaults<D>(), at_once).ok());
     QueryStructure<D> stopped = MakeStructure<D>(cloud);
-    Refinement<D> refinement(stopped, Defaults<D>().min_edge);
+    BoxRefinement<D> refinement(stopped, Defaults<D>().min_edge);
     RunContext context;
     absl::Status status = absl::UnknownError("not begun");
     int stops = 0;

@@ -79,7 +79,7 @@ SimplexSet<D> SetOfCells(const QueryStructure<D>& structure, const std::vector<u
 template <int D>
 StarLists<D> Refine(QueryStructure<D>& structure) {
   RunContext context;
-  Refinement<D> refinement(structure, 0x1p-48);
+  BoxRefinement<D> refinement(structure, 0x1p-48);
   const absl::Status refined = refinement.Run({.rho = std::sqrt(1 << (D - 1))}, 1'000'000, 1, context);
   EXPECT_TRUE(refined.ok()) << refined;
   return refinement.stars();
@@ -182,7 +182,7 @@ class StarsOfRefinementTest : public test::SeededTest {
   StarsOfRefinementTest() : SeededTest(47) {}
 
   template <int D>
-  static absl::Status Run(Refinement<D>& refinement, RunContext& context,
+  static absl::Status Run(BoxRefinement<D>& refinement, RunContext& context,
                           const RefinementObserver<D>& observer = nullptr) {
     const int threads = 2;
     return refinement.Run({.rho = std::sqrt(1 << (D - 1))}, 1'000'000, threads, context, observer);
@@ -201,7 +201,7 @@ class StarsOfRefinementTest : public test::SeededTest {
   template <int D>
   void ExpectThoseOfCellsAfterVerticesWereAdded(std::string_view kind) {
     QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, D == 2 ? 200 : D == 3 ? 60 : 8));
-    Refinement<D> refinement(structure, 0x1p-48);
+    BoxRefinement<D> refinement(structure, 0x1p-48);
     RunContext context;
     ASSERT_TRUE(Run<D>(refinement, context).ok());
     for (int round = 0; round < 3; ++round) {
@@ -222,7 +222,7 @@ class StarsOfRefinementTest : public test::SeededTest {
   template <int D>
   void ExpectThoseOfCellsAfterStops(std::string_view kind) {
     QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, D == 2 ? 300 : 80));
-    Refinement<D> refinement(structure, 0x1p-48);
+    BoxRefinement<D> refinement(structure, 0x1p-48);
     absl::Status status = absl::CancelledError();
     int stops = 0;
     for (; absl::IsCancelled(status); ++stops) {
@@ -243,7 +243,7 @@ class StarsOfRefinementTest : public test::SeededTest {
   template <int D>
   void ExpectThoseOfCellsWithinBudgets(const MeshCriteria<D>& criteria) {
     QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("uniform", D == 2 ? 400 : 100));
-    Refinement<D> refinement(structure, 0x1p-48);
+    BoxRefinement<D> refinement(structure, 0x1p-48);
     absl::Status status = absl::ResourceExhaustedError("");
     int stops = 0;
     for (; absl::IsResourceExhausted(status); ++stops) {
@@ -261,7 +261,7 @@ class StarsOfRefinementTest : public test::SeededTest {
 TEST_F(StarsOfRefinementTest, GiveTheSimplicesAfterVerticesWereMoved) {
   constexpr double kMinEdge = 0x1p-48;
   QueryStructure<3> structure = MakeStructure<3>(test::SortedCloud<3>("uniform", 100));
-  Refinement<3> refinement(structure, kMinEdge);
+  BoxRefinement<3> refinement(structure, kMinEdge);
   std::vector<bool> is_fixed(structure.vertex_count(), true);
   RunContext context;
   ASSERT_TRUE(Run<3>(refinement, context).ok());

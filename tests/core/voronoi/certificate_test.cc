@@ -165,7 +165,7 @@ TYPED_TEST(CertificateTest, CellsHaveOneAtEveryStageOfRefinement) {
         certified = CertifyCell<D>(at, v, radius, workspace.cell);
       }
     };
-    Refinement<D> refinement(structure, 0x1p-48);
+    BoxRefinement<D> refinement(structure, 0x1p-48);
     const absl::Status refined = refinement.Run({.rho = ByDimension<D>({std::sqrt(2.0), 2.0, 2.9, 4.1, 5.8})},
                                                 kMaxVertices, 2, context, observer);
     ASSERT_TRUE(refined.ok() || (D >= 5 && structure.vertex_count() == kMaxVertices)) << refined;

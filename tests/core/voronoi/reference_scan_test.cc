@@ -461,7 +461,7 @@ TYPED_TEST(ReferenceScanTest, AgreesWithTheFastScanAtEveryStageOfRefinement) {
       const VertexId any = VertexId(this->random_.Below(at.vertex_count()));
       comparer.Compare(at, any, 4 * std::sqrt(test::NearestDistanceSq<D>(at, any)));
     };
-    Refinement<D> refinement(structure, 0x1p-48);
+    BoxRefinement<D> refinement(structure, 0x1p-48);
     const absl::Status status =
         refinement.Run({.rho = ByDimension<D>({std::sqrt(2.0), 2.0, 2.9})}, 100'000, 1, context, observer);
     ASSERT_TRUE(status.ok()) << status;

@@ -277,7 +277,7 @@ TYPED_TEST(VoronoiOracleTest, QueriesAreExactAtEveryStageOfRefinement) {
         checker.CheckAll(at, VertexId{at.vertex_count() - 1});
       }
     };
-    Refinement<D> refinement(structure, 1e-9);
+    BoxRefinement<D> refinement(structure, 1e-9);
     const absl::Status status =
         refinement.Run({.rho = ByDimension<D>({2.0, 2.0, 2.9, 4.1})}, 600, 1, context, observer);
     EXPECT_TRUE(status.ok() || status.code() == absl::StatusCode::kResourceExhausted) << status;

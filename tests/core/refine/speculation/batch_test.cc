@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/refine/box_domain.h"
 #include "core/refine/speculation/recorded_steps.h"
 #include "core/refine/star_writer.h"
 
@@ -42,7 +43,7 @@ class BatchTest : public ::testing::Test {
     batch_.records.by_vertex[at].reach_sq = kReach * kReach;
     batch_.records.notices.push_back({neighbour, 1, false});
     batch_.records.steps.push_back({{}, 1, true});
-    InsertionRequest<2> request;
+    BoxDomain<2>::Request request;
     request.insertion.near = batch_.vertices[at];
     request.insertion.other = neighbour;
     request.point.position = p;
@@ -58,7 +59,7 @@ class BatchTest : public ::testing::Test {
     return batch_.IsStillValid(0, kFirstSite) == first && batch_.IsStillValid(1, kSecondSite) == second;
   }
 
-  Batch<2> batch_;
+  Batch<BoxDomain<2>> batch_;
 };
 
 TEST_F(BatchTest, RecordsAreValidUntilAVertexConflicts) {
@@ -103,7 +104,7 @@ TEST_F(BatchTest, WhatIsExpectedAndNotInsertedConflicts) {
 TEST_F(BatchTest, StepsAreReplayedWithTheNumbersOfTheStructure) {
   batch_.numbers[0] = VertexId{140};
   batch_.refined = 1;
-  RecordedSteps<2> steps(batch_);
+  RecordedSteps<BoxDomain<2>> steps(batch_);
   ASSERT_NE(steps.Assess(), nullptr);
   ASSERT_EQ(steps.Notices().size(), 1);
   EXPECT_EQ(steps.Notices()[0].vertex, VertexId{140});
@@ -125,7 +126,7 @@ TEST_F(BatchTest, WhatIsReassessedTakesThePlaceOfWhatWasFound) {
   batch_.records.Begin(0);
   batch_.records.steps.push_back({.found = {.bad_node = 3}, .is_reassessed = true});
   batch_.records.reassessed.push_back({.bad_node = -1, .next_edge_sq = 4});
-  RecordedSteps<2> steps(batch_);
+  RecordedSteps<BoxDomain<2>> steps(batch_);
   const Assessment* const found = steps.Assess();
   ASSERT_NE(found, nullptr);
   EXPECT_EQ(found->bad_node, 3) << "until a request is looked for";

@@ -37,7 +37,7 @@ struct RefinedIn {
       : structure(MakeStructure<D>(cloud)), refinement(structure, kMinEdge) {}
 
   QueryStructure<D> structure;
-  Refinement<D> refinement;
+  BoxRefinement<D> refinement;
 };
 using Refined = RefinedIn<2>;
 

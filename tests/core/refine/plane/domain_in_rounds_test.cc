@@ -14,6 +14,7 @@
 #include "core/base/thread_team.h"
 #include "core/domain_cloud.h"
 #include "core/mesher.h"
+#include "core/refine/plane/plane_domain.h"
 #include "core/refine/refine.h"
 #include "core/simplex/domain_simplices.h"
 #include "tests/support/clouds.h"
@@ -119,7 +120,7 @@ struct Refined {
     planar = std::move(made->planar);
     EXPECT_TRUE(
         structure.Initialize(made->cloud.grid, std::move(made->cloud.points), kMany, 1, context, planar->Ends()).ok());
-    refinement = std::make_unique<Refinement<2>>(structure, made->domain.MinEdge(), planar.get());
+    refinement = std::make_unique<Refinement<PlaneDomain>>(structure, made->domain.MinEdge(), PlaneDomain(*planar));
     MeshCriteria<2> criteria{.rho = rho};
     criteria.sizes = SizeField<2>(size * made->domain.scale);
     const absl::Status status = refinement->Run(criteria, kMany, threads, context);
@@ -128,7 +129,7 @@ struct Refined {
 
   QueryStructure<2> structure;
   std::unique_ptr<PlanarDomain> planar;
-  std::unique_ptr<Refinement<2>> refinement;
+  std::unique_ptr<Refinement<PlaneDomain>> refinement;
 };
 
 void ExpectSame(const Refined& actual, const Refined& expected) {

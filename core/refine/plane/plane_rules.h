@@ -1,7 +1,7 @@
 // The rules of refinement in a domain of the plane: what is wrong with a cell, which segment is to be split, and where
-// a new vertex goes. DomainSteps asks them in each step of a vertex, for the loop and for the threads that speculate.
-#ifndef WELLSPACE_CORE_REFINE_DOMAIN_DOMAIN_RULES_H_
-#define WELLSPACE_CORE_REFINE_DOMAIN_DOMAIN_RULES_H_
+// a new vertex goes. PlaneSteps asks them in each step of a vertex, for the loop and for the threads that speculate.
+#ifndef WELLSPACE_CORE_REFINE_PLANE_PLANE_RULES_H_
+#define WELLSPACE_CORE_REFINE_PLANE_PLANE_RULES_H_
 
 #include <cstddef>
 #include <cstdint>
@@ -13,20 +13,20 @@
 #include "core/cell/polytope.h"
 #include "core/geometry/point.h"
 #include "core/refine/assessment.h"
-#include "core/refine/domain/expected_vertices.h"
-#include "core/refine/domain/met_part.h"
-#include "core/refine/domain/node_view.h"
-#include "core/refine/domain/planar_domain.h"
-#include "core/refine/domain/visible_domain.h"
 #include "core/refine/insertion.h"
-#include "core/refine/place_in_domain.h"
+#include "core/refine/plane/expected_vertices.h"
+#include "core/refine/plane/met_part.h"
+#include "core/refine/plane/node_view.h"
+#include "core/refine/plane/planar_domain.h"
+#include "core/refine/plane/plane_place.h"
+#include "core/refine/plane/visible_domain.h"
 #include "core/refine/step_rules.h"
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {
 
 // What is wrong with a cell in a domain. The loop and the records see what every cell has; the part is for the request.
-struct DomainAssessment : Assessment {
+struct PlaneAssessment : Assessment {
   MetPart met;  // there if is_segment_encroached
 };
 
@@ -52,30 +52,32 @@ struct PassedOver {
 //
 // Thread safety: thread-compatible; const functions may run at once, and, with expected vertices, beside
 // QueryStructure::AddUncommitted and PlanarDomain::AddVertex.
-class DomainRules {
+class PlaneRules {
  public:
   // The vertices are those of the structure, uncommitted ones, too; or those that are committed, and the `expected`.
   //
   // REQUIRES:   all references outlive this.
-  DomainRules(const QueryStructure<2>& structure, const PlanarDomain& domain, const StepRules<2>& rules,
-              const ExpectedVertices* expected = nullptr)
+  PlaneRules(const QueryStructure<2>& structure, const PlanarDomain& domain, const StepRules<2>& rules,
+             const ExpectedVertices* expected = nullptr)
       : visible_(structure, domain, expected),
         rules_(rules),
         plain_ratio_(rules.criteria().sizes.IsUnbounded() && !domain.HasAreaBounds() ? rules.criteria().rho : 0) {}
+
+  const StepRules<2>& step_rules() const { return rules_; }
 
   // How far `v` is from the nearest segment that it is not on, squared, if that is less than `limit_sq`; else that. By
   // it a vertex comes into its first bucket.
   //
   // Complexity: that of a query.
-  double NearestSegmentSq(VertexId v, double limit_sq, Workspace<2>& workspace) const;
+  double NearestFeatureSq(VertexId v, double limit_sq, Workspace<2>& workspace) const;
 
   // What is wrong with the cell of `v`, whose nodes are placed unless it is plainly good; `segments` has all that meet
   // it. What a cell is beyond the segments of v, on sides that are not meshed, does not count. What is in `passed_over`
   // asks for nothing.
   //
   // Complexity: O(nodes segments).
-  DomainAssessment AssessCell(VertexId v, Polytope<2>& cell, std::span<const uint32_t> segments, double edge_limit_sq,
-                              const PassedOver& passed_over) const;
+  PlaneAssessment AssessCell(VertexId v, Polytope<2>& cell, std::span<const uint32_t> segments, double edge_limit_sq,
+                             const PassedOver& passed_over) const;
 
   // The insertion that `cell`, that of `v`, asks for by what was found; or the node or segment that is to be passed
   // over, after which the cell has to be assessed again; none of these if nothing is asked for. `segments` as in
@@ -83,12 +85,12 @@ class DomainRules {
   //
   // Complexity: O(nodes), a few queries, and the cell of cell_of.
   struct Answer {
-    std::optional<InsertionRequest<2>> request;
+    std::optional<PlaneRequest> request;
     std::optional<NodeName> refused_node;
     std::optional<uint32_t> passed_segment;
   };
   Answer NextRequest(VertexId v, const Polytope<2>& cell, std::span<const uint32_t> segments,
-                     const DomainAssessment& found, double edge_limit_sq, StepRules<2>::CellOf cell_of,
+                     const PlaneAssessment& found, double edge_limit_sq, StepRules<2>::CellOf cell_of,
                      Workspace<2>& workspace) const;
 
  private:
@@ -120,8 +122,7 @@ class DomainRules {
                           std::span<const uint32_t> segments, double& distance_sq) const;
 
   // A vertex on a segment, by rule 1 or in the place of a point.
-  InsertionRequest<2> RequestAt(VertexId v, const PlaceInDomain& place, double edge_limit_sq,
-                                Workspace<2>& workspace) const;
+  PlaneRequest RequestAt(VertexId v, const PlanePlace& place, double edge_limit_sq, Workspace<2>& workspace) const;
 
   const VisibleDomain visible_;
   const StepRules<2>& rules_;
@@ -130,4 +131,4 @@ class DomainRules {
 
 }  // namespace wellspace::core
 
-#endif  // WELLSPACE_CORE_REFINE_DOMAIN_DOMAIN_RULES_H_
+#endif  // WELLSPACE_CORE_REFINE_PLANE_PLANE_RULES_H_

@@ -1,14 +1,14 @@
-// Which segment a cell meets: rule 1 of a domain begins with it (DomainRules::AssessCell).
-#ifndef WELLSPACE_CORE_REFINE_DOMAIN_MET_PART_H_
-#define WELLSPACE_CORE_REFINE_DOMAIN_MET_PART_H_
+// Which segment a cell meets: rule 1 of a domain begins with it (PlaneRules::AssessCell).
+#ifndef WELLSPACE_CORE_REFINE_PLANE_MET_PART_H_
+#define WELLSPACE_CORE_REFINE_PLANE_MET_PART_H_
 
 #include <cstdint>
 #include <span>
 
 #include "core/base/ids.h"
 #include "core/cell/polytope.h"
-#include "core/refine/domain/planar_domain.h"
-#include "core/refine/place_in_domain.h"
+#include "core/refine/plane/planar_domain.h"
+#include "core/refine/plane/plane_place.h"
 
 namespace wellspace::core {
 
@@ -39,4 +39,4 @@ MetPart NearestMet(const PlanarDomain& domain, VertexId v, const Polytope<2>& ce
 
 }  // namespace wellspace::core
 
-#endif  // WELLSPACE_CORE_REFINE_DOMAIN_MET_PART_H_
+#endif  // WELLSPACE_CORE_REFINE_PLANE_MET_PART_H_

@@ -1,4 +1,4 @@
-#include "core/refine/domain/met_part.h"
+#include "core/refine/plane/met_part.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // Where vertices are in a domain: on which segments, in which sectors and faces.
-#include "core/refine/domain/planar_domain.h"
+#include "core/refine/plane/planar_domain.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 #include <numbers>
 #include <vector>
 
-#include "tests/core/refine/domain/small_domain.h"
+#include "tests/core/refine/plane/small_domain.h"
 
 namespace wellspace::core {
 namespace {

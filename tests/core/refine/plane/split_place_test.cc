@@ -1,5 +1,5 @@
 // Where segments are split, and which records of splits are still valid.
-#include "core/refine/domain/split_place.h"
+#include "core/refine/plane/split_place.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/voronoi/extra_vertices.h"
-#include "tests/core/refine/domain/small_domain.h"
+#include "tests/core/refine/plane/small_domain.h"
 
 namespace wellspace::core {
 namespace {
@@ -32,7 +32,7 @@ class SplitPlaceTest : public ::testing::Test {
 
 TEST_F(SplitPlaceTest, AVertexOnASegmentNearbyGivesItsOwnDistance) {
   const VertexId v = domain_.Split(kApex, kAbove, 1.7);
-  const PlaceInDomain place = SplitPlace(visible_, v, Met(long_));
+  const PlanePlace place = SplitPlace(visible_, v, Met(long_));
   EXPECT_EQ(place.on.segment, long_.segment);
   EXPECT_EQ(place.on.is_from_b, long_.is_from_b);
   EXPECT_EQ(place.on.distance, 1.7) << "to the bit";
@@ -43,17 +43,17 @@ TEST_F(SplitPlaceTest, AVertexInAFaceGivesItsFootAtARoundDistance) {
   domain_.Split(kApex, kRight, 3.5);
   const VertexId v = domain_.At({0, 1});
   const MetPart met{long_.segment, long_.is_from_b ? 2.9 : 0.9, long_.is_from_b ? 3.1 : 1.1, 1};
-  const PlaceInDomain place = SplitPlace(visible_, v, met);  // the foot is beyond the part
+  const PlanePlace place = SplitPlace(visible_, v, met);  // the foot is beyond the part
   EXPECT_EQ(FromApex(place.on), 1) << "0.9, rounded by at most 0.3";
 }
 
 TEST_F(SplitPlaceTest, TheFirstBetweenTwoSmallAnglesIsInTheMiddleThird) {
   const SegmentPoint near_apex{long_.segment, long_.is_from_b, 0.25};
-  const PlaceInDomain first = RoundPlace(visible_, near_apex, 1e-3);
+  const PlanePlace first = RoundPlace(visible_, near_apex, 1e-3);
   EXPECT_NEAR(first.on.distance, 4 / 3.0, 1e-3);
   EXPECT_EQ(first.order, SplitOrder::kFirst);
   domain_.Split(kApex, kRight, 2);
-  const PlaceInDomain later = RoundPlace(visible_, near_apex, 1e-3);
+  const PlanePlace later = RoundPlace(visible_, near_apex, 1e-3);
   EXPECT_EQ(later.on.distance, 0.25);
   EXPECT_EQ(later.order, SplitOrder::kAny);
 }
@@ -61,7 +61,7 @@ TEST_F(SplitPlaceTest, TheFirstBetweenTwoSmallAnglesIsInTheMiddleThird) {
 TEST_F(SplitPlaceTest, AnExpectedVertexSplitsASegmentToo) {
   ExtraVertices<2> positions;
   positions.Clear(VertexId{1000});
-  std::vector<InsertionRequest<2>> requests(1);
+  std::vector<PlaneRequest> requests(1);
   requests[0].place.on = {long_.segment, false, 2};
   requests[0].point.position = {2, 0};
   positions.Append({2, 0});
@@ -74,7 +74,7 @@ TEST_F(SplitPlaceTest, AnExpectedVertexSplitsASegmentToo) {
 }
 
 TEST_F(SplitPlaceTest, ARecordDependsOnWhetherTheSegmentIsWhole) {
-  std::vector<InsertionRequest<2>> requests(1);
+  std::vector<PlaneRequest> requests(1);
   requests[0].place.on.segment = long_.segment;
   const auto are_in_order = [&](SplitOrder order) {
     requests.back().place.order = order;

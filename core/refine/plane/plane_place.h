@@ -1,10 +1,12 @@
-// Where a vertex is in a domain of the plane: a point of a segment, or inside a face. Places are what PlanarDomain
-// keeps of vertices, what requests carry (InsertionRequest), and what points that are added get (PointPlacer).
-#ifndef WELLSPACE_CORE_REFINE_PLACE_IN_DOMAIN_H_
-#define WELLSPACE_CORE_REFINE_PLACE_IN_DOMAIN_H_
+// Where a vertex is in a domain of the plane: a point of a segment, or inside a face. PlanarDomain keeps places of
+// vertices, requests carry them, and points that are added get them (PointPlacer).
+#ifndef WELLSPACE_CORE_REFINE_PLANE_PLANE_PLACE_H_
+#define WELLSPACE_CORE_REFINE_PLANE_PLANE_PLACE_H_
 
 #include <cstdint>
 #include <limits>
+
+#include "core/refine/insertion.h"
 
 namespace wellspace::core {
 
@@ -28,12 +30,16 @@ enum class SplitOrder : uint8_t {
 };
 
 // Where a new vertex is: on a segment, or else inside a face.
-struct PlaceInDomain {
+struct PlanePlace {
   SegmentPoint on;
   uint32_t face = 0;
   SplitOrder order = SplitOrder::kAny;
+
+  bool IsOnFeature() const { return on.IsOnSegment(); }
 };
+
+using PlaneRequest = InsertionRequest<2, PlanePlace>;
 
 }  // namespace wellspace::core
 
-#endif  // WELLSPACE_CORE_REFINE_PLACE_IN_DOMAIN_H_
+#endif  // WELLSPACE_CORE_REFINE_PLANE_PLANE_PLACE_H_

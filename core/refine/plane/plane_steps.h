@@ -1,7 +1,7 @@
 // The steps of one vertex in a domain of the plane, computed from its cell: what CellSteps is in the box. Made by
-// Refinement::RefineInDomain for the loop, and by Rounds::Record to be recorded.
-#ifndef WELLSPACE_CORE_REFINE_DOMAIN_DOMAIN_STEPS_H_
-#define WELLSPACE_CORE_REFINE_DOMAIN_DOMAIN_STEPS_H_
+// Refinement::RefineByCell for the loop, and by Rounds::Record to be recorded.
+#ifndef WELLSPACE_CORE_REFINE_PLANE_PLANE_STEPS_H_
+#define WELLSPACE_CORE_REFINE_PLANE_PLANE_STEPS_H_
 
 #include <cstddef>
 #include <optional>
@@ -13,11 +13,11 @@
 #include "core/cell/star.h"
 #include "core/refine/assessment.h"
 #include "core/refine/cell_steps.h"
-#include "core/refine/domain/domain_rules.h"
-#include "core/refine/domain/node_view.h"
 #include "core/refine/face_watchers.h"
 #include "core/refine/insertion.h"
 #include "core/refine/neighbor_notice.h"
+#include "core/refine/plane/node_view.h"
+#include "core/refine/plane/plane_rules.h"
 #include "core/refine/star_writer.h"
 
 namespace wellspace::core {
@@ -29,13 +29,12 @@ namespace wellspace::core {
 //
 // Thread safety: as CellSteps.
 template <typename Cells>
-class DomainSteps {
+class PlaneSteps {
  public:
   // REQUIRES:   all references outlive this.
-  DomainSteps(const DomainRules& rules, const StepRules<2>& step_rules, VertexId v, double edge_limit_sq, Cells& cells,
-              StepWorkspace<2>& workspace)
+  PlaneSteps(const PlaneRules& rules, VertexId v, double edge_limit_sq, Cells& cells, StepWorkspace<2>& workspace)
       : rules_(rules), cells_(cells), workspace_(workspace), v_(v), edge_limit_sq_(edge_limit_sq) {
-    cells_.ComputeOwn(v, step_rules.ClipAround(v, edge_limit_sq), workspace.own);
+    cells_.ComputeOwn(v, rules.step_rules().ClipAround(v, edge_limit_sq), workspace.own);
   }
 
   Polytope<2>& cell() { return workspace_.own.cell; }
@@ -62,13 +61,13 @@ class DomainSteps {
     });
   }
 
-  const InsertionRequest<2>* NextRequest() {
+  const PlaneRequest* NextRequest() {
     const auto cell_of = [this](VertexId u, const Box<2>& clip) {
       return cells_.ComputeOther(u, clip, workspace_.other);
     };
     is_reassessed_ = false;
     while (true) {
-      DomainRules::Answer answer =
+      PlaneRules::Answer answer =
           rules_.NextRequest(v_, cell(), workspace_.own.segments, found_, edge_limit_sq_, cell_of, workspace_.other);
       request_ = answer.request;
       if (answer.refused_node.has_value()) {
@@ -102,17 +101,17 @@ class DomainSteps {
   const Assessment* Reassessed() const { return is_reassessed_ ? &found_ : nullptr; }
 
  private:
-  const DomainRules& rules_;
+  const PlaneRules& rules_;
   Cells& cells_;
   StepWorkspace<2>& workspace_;
   const VertexId v_;
   const double edge_limit_sq_;
-  DomainAssessment found_;
+  PlaneAssessment found_;
   PassedOver passed_over_;      // in all steps of the vertex
   bool is_reassessed_ = false;  // while the last request was looked for
-  std::optional<InsertionRequest<2>> request_;
+  std::optional<PlaneRequest> request_;
 };
 
 }  // namespace wellspace::core
 
-#endif  // WELLSPACE_CORE_REFINE_DOMAIN_DOMAIN_STEPS_H_
+#endif  // WELLSPACE_CORE_REFINE_PLANE_PLANE_STEPS_H_

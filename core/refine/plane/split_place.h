@@ -1,16 +1,16 @@
 // Where on a segment a new vertex goes: at the distance that another segment has it, at a round one, or in the middle
-// third. Called by DomainRules for requests, and for the records of them.
-#ifndef WELLSPACE_CORE_REFINE_DOMAIN_SPLIT_PLACE_H_
-#define WELLSPACE_CORE_REFINE_DOMAIN_SPLIT_PLACE_H_
+// third. Called by PlaneRules for requests, and for the records of them.
+#ifndef WELLSPACE_CORE_REFINE_PLANE_SPLIT_PLACE_H_
+#define WELLSPACE_CORE_REFINE_PLANE_SPLIT_PLACE_H_
 
 #include <span>
 
 #include "core/base/ids.h"
-#include "core/refine/domain/met_part.h"
-#include "core/refine/domain/planar_domain.h"
-#include "core/refine/domain/visible_domain.h"
 #include "core/refine/insertion.h"
-#include "core/refine/place_in_domain.h"
+#include "core/refine/plane/met_part.h"
+#include "core/refine/plane/planar_domain.h"
+#include "core/refine/plane/plane_place.h"
+#include "core/refine/plane/visible_domain.h"
 
 namespace wellspace::core {
 
@@ -24,18 +24,18 @@ inline constexpr double kSameDistance = 1e-9;
 //   2. Else at the foot of v, as far as that is in the part, by RoundPlace.
 //
 // Source:     docs/design/features.md, where a segment is split.
-PlaceInDomain SplitPlace(const VisibleDomain& visible, VertexId v, const MetPart& met);
+PlanePlace SplitPlace(const VisibleDomain& visible, VertexId v, const MetPart& met);
 
 // The place of a vertex that comes to `on` for another reason than an equal distance, with nothing within `room` of it.
 // The first on a segment with small angles at both ends is kept in the middle third; at an end with a small angle the
 // distance becomes a round one, so that equal reasons find equal distances.
-PlaceInDomain RoundPlace(const VisibleDomain& visible, SegmentPoint on, double room);
+PlanePlace RoundPlace(const VisibleDomain& visible, SegmentPoint on, double room);
 
 // Whether on the segments of recorded `requests`, those of one vertex, vertices have been inserted as it was assumed.
 //
 // Complexity: O(requests^2).
-bool AreSplitsInOrder(const PlanarDomain& domain, std::span<const InsertionRequest<2>> requests);
+bool AreSplitsInOrder(const PlanarDomain& domain, std::span<const PlaneRequest> requests);
 
 }  // namespace wellspace::core
 
-#endif  // WELLSPACE_CORE_REFINE_DOMAIN_SPLIT_PLACE_H_
+#endif  // WELLSPACE_CORE_REFINE_PLANE_SPLIT_PLACE_H_

@@ -1,8 +1,8 @@
 // A domain in the plane while it is refined: its segments and faces, and where each vertex is on them. MakeDomainCloud
 // makes it of the planar graph. Refinement, DomainMesher and PointPlacer add each vertex here that is added to the
 // QueryStructure; the rules, the triangles and the estimate read it.
-#ifndef WELLSPACE_CORE_REFINE_DOMAIN_PLANAR_DOMAIN_H_
-#define WELLSPACE_CORE_REFINE_DOMAIN_PLANAR_DOMAIN_H_
+#ifndef WELLSPACE_CORE_REFINE_PLANE_PLANAR_DOMAIN_H_
+#define WELLSPACE_CORE_REFINE_PLANE_PLANAR_DOMAIN_H_
 
 #include <atomic>
 #include <cstddef>
@@ -18,7 +18,7 @@
 #include "core/features/planar_graph.h"
 #include "core/geometry/point.h"
 #include "core/geometry/segment.h"
-#include "core/refine/place_in_domain.h"
+#include "core/refine/plane/plane_place.h"
 #include "core/tree/segment_lists.h"
 
 namespace wellspace::core {
@@ -203,4 +203,4 @@ class PlanarDomain {
 
 }  // namespace wellspace::core
 
-#endif  // WELLSPACE_CORE_REFINE_DOMAIN_PLANAR_DOMAIN_H_
+#endif  // WELLSPACE_CORE_REFINE_PLANE_PLANAR_DOMAIN_H_

@@ -1,4 +1,4 @@
-#include "core/refine/domain/domain_rules.h"
+#include "core/refine/plane/plane_rules.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <tuple>
 
 #include "core/geometry/segment.h"
-#include "core/refine/domain/split_place.h"
+#include "core/refine/plane/split_place.h"
 #include "core/refine/rounding.h"
 #include "core/refine/steiner_point.h"
 
@@ -48,7 +48,7 @@ class FacesAround {
 
 }  // namespace
 
-double DomainRules::NearestSegmentSq(VertexId v, double limit_sq, Workspace<2>& workspace) const {
+double PlaneRules::NearestFeatureSq(VertexId v, double limit_sq, Workspace<2>& workspace) const {
   const Point<2>& p = structure().point(v);
   structure().SegmentsWithin(p, std::sqrt(limit_sq), v, workspace);
   for (const uint32_t segment : workspace.segments) {
@@ -63,7 +63,7 @@ double DomainRules::NearestSegmentSq(VertexId v, double limit_sq, Workspace<2>& 
 // Whether `v` and `u` are at the same distance from a common end of their segments, which make an angle of less than 60
 // degrees there; and the triangle on their edge, which lies in the direction `toward` from v, is on the side of that
 // end, or between both segments. No vertex could make it better.
-bool DomainRules::IsAcross(VertexId v, VertexId u, const Point<2>& toward) const {
+bool PlaneRules::IsAcross(VertexId v, VertexId u, const Point<2>& toward) const {
   for (const HalfEdge h : domain().WaysFrom(v)) {
     for (const bool is_b : {false, true}) {
       if (IsAcrossFrom(SegmentOf(h), is_b, v, u, toward)) {
@@ -75,7 +75,7 @@ bool DomainRules::IsAcross(VertexId v, VertexId u, const Point<2>& toward) const
 }
 
 // The same with the end of `segment`, which v is on, as the common one.
-bool DomainRules::IsAcrossFrom(uint32_t segment, bool is_b, VertexId v, VertexId u, const Point<2>& toward) const {
+bool PlaneRules::IsAcrossFrom(uint32_t segment, bool is_b, VertexId v, VertexId u, const Point<2>& toward) const {
   const VertexId apex = domain().EndVertex(segment, is_b);
   if (apex == v || apex == u) {
     return false;
@@ -106,7 +106,7 @@ bool DomainRules::IsAcrossFrom(uint32_t segment, bool is_b, VertexId v, VertexId
 
 // Whether an own segment of `v` lies between the generators of a node: it is not yet what it will be, and no triangle
 // lies there.
-bool DomainRules::IsCrossed(VertexId v, const NodeView& node) const {
+bool PlaneRules::IsCrossed(VertexId v, const NodeView& node) const {
   if (!node.IsTriangle()) {
     return false;
   }
@@ -122,8 +122,8 @@ bool DomainRules::IsCrossed(VertexId v, const NodeView& node) const {
 }
 
 // The squared distance from the site that a node in `face` must not exceed, if it does; else kNone.
-DomainRules::Bound DomainRules::BoundOf(const Polytope<2>& cell, const CellNode<2>& node, const NodeView& view,
-                                        uint32_t face) const {
+PlaneRules::Bound PlaneRules::BoundOf(const Polytope<2>& cell, const CellNode<2>& node, const NodeView& view,
+                                      uint32_t face) const {
   const MeshCriteria<2>& criteria = rules_.criteria();
   Bound bound{criteria.rho * criteria.rho * view.edge_sq, false};
   if (node.radius_sq <= bound.sq) {
@@ -143,9 +143,9 @@ DomainRules::Bound DomainRules::BoundOf(const Polytope<2>& cell, const CellNode<
   return bound;
 }
 
-DomainAssessment DomainRules::AssessCell(VertexId v, Polytope<2>& cell, std::span<const uint32_t> segments,
-                                         double edge_limit_sq, const PassedOver& passed_over) const {
-  DomainAssessment result;
+PlaneAssessment PlaneRules::AssessCell(VertexId v, Polytope<2>& cell, std::span<const uint32_t> segments,
+                                       double edge_limit_sq, const PassedOver& passed_over) const {
+  PlaneAssessment result;
   const bool keeps_ratio = cell.KeepsRatio(plain_ratio_);
   if (keeps_ratio && !MayMeetAny(domain(), v, cell, segments)) {
     result.is_plain = true;
@@ -199,16 +199,16 @@ DomainAssessment DomainRules::AssessCell(VertexId v, Polytope<2>& cell, std::spa
 }
 
 // Whether a node of the cell of `v` is the circumcentre of a triangle with a corner on a segment.
-bool DomainRules::IsAtSegment(VertexId v, const NodeView& node) const {
+bool PlaneRules::IsAtSegment(VertexId v, const NodeView& node) const {
   const auto generators = std::span(node.generators).first(node.bisectors);
   return !domain().IsInFace(v) || std::any_of(generators.begin(), generators.end(),
                                               [&](const Plane<2>* plane) { return !visible_.IsInFace(plane->vertex); });
 }
 
 // The insertion of a vertex at `place`, for `v`.
-InsertionRequest<2> DomainRules::RequestAt(VertexId v, const PlaceInDomain& place, double edge_limit_sq,
-                                           Workspace<2>& workspace) const {
-  InsertionRequest<2> request;
+PlaneRequest PlaneRules::RequestAt(VertexId v, const PlanePlace& place, double edge_limit_sq,
+                                   Workspace<2>& workspace) const {
+  PlaneRequest request;
   request.place = place;
   request.insertion.reason = Reason::kEncroachment;
   request.insertion.near = v;
@@ -225,10 +225,10 @@ InsertionRequest<2> DomainRules::RequestAt(VertexId v, const PlaceInDomain& plac
 // that are nearer to it than any vertex, whatever the leaves of the tree: the ball about a point of a cell that touches
 // its site is covered by those about the nodes, so that leaves it meets have been opened for the cell. That is the own
 // one, for which `segments` are listed, or the one of cell_of, for which they are in the workspace.
-SteinerPoint<2> DomainRules::CandidateIn(size_t sector, VertexId v, const Polytope<2>& cell,
-                                         std::span<const uint32_t> segments, const Assessment& found,
-                                         bool is_at_segment, double edge_limit_sq, StepRules<2>::CellOf cell_of,
-                                         Workspace<2>& workspace) const {
+SteinerPoint<2> PlaneRules::CandidateIn(size_t sector, VertexId v, const Polytope<2>& cell,
+                                        std::span<const uint32_t> segments, const Assessment& found, bool is_at_segment,
+                                        double edge_limit_sq, StepRules<2>::CellOf cell_of,
+                                        Workspace<2>& workspace) const {
   const auto find_segments = [&](const SteinerPoint<2>& point) {
     workspace.segments.insert(workspace.segments.end(), segments.begin(), segments.end());
     std::erase_if(workspace.segments, [&](uint32_t segment) {
@@ -253,8 +253,8 @@ SteinerPoint<2> DomainRules::CandidateIn(size_t sector, VertexId v, const Polyto
 
 // The foot of `candidate` on the nearest of `segments`, if that is nearer than the empty radius over the square root of
 // 2; or, if the candidate is not in the sector, on the nearest segment of `v`. `distance_sq` is how far it is then.
-SegmentPoint DomainRules::YieldPlace(const SteinerPoint<2>& candidate, VertexId v, bool is_in_sector,
-                                     std::span<const uint32_t> segments, double& distance_sq) const {
+SegmentPoint PlaneRules::YieldPlace(const SteinerPoint<2>& candidate, VertexId v, bool is_in_sector,
+                                    std::span<const uint32_t> segments, double& distance_sq) const {
   distance_sq = is_in_sector ? 0.5 * candidate.empty_radius_sq : std::numeric_limits<double>::infinity();
   SegmentPoint place;
   for (const uint32_t segment : segments) {
@@ -268,9 +268,9 @@ SegmentPoint DomainRules::YieldPlace(const SteinerPoint<2>& candidate, VertexId 
   return place;
 }
 
-DomainRules::Answer DomainRules::NextRequest(VertexId v, const Polytope<2>& cell, std::span<const uint32_t> segments,
-                                             const DomainAssessment& found, double edge_limit_sq,
-                                             StepRules<2>::CellOf cell_of, Workspace<2>& workspace) const {
+PlaneRules::Answer PlaneRules::NextRequest(VertexId v, const Polytope<2>& cell, std::span<const uint32_t> segments,
+                                           const PlaneAssessment& found, double edge_limit_sq,
+                                           StepRules<2>::CellOf cell_of, Workspace<2>& workspace) const {
   Answer answer;
   if (found.met.IsThere()) {  // rule 1
     answer.request = RequestAt(v, SplitPlace(visible_, v, found.met), edge_limit_sq, workspace);
@@ -308,7 +308,7 @@ DomainRules::Answer DomainRules::NextRequest(VertexId v, const Polytope<2>& cell
     }
     return answer;
   }
-  InsertionRequest<2>& request = answer.request.emplace();
+  PlaneRequest& request = answer.request.emplace();
   request.place.face = domain().FaceOfSector(v, sector);
   request.candidate = candidate;
   request.point = candidate;

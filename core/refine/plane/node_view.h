@@ -1,7 +1,7 @@
-// What a node of a cell in the plane is between. DomainRules looks at each node of a cell so: which triangle stands
+// What a node of a cell in the plane is between. PlaneRules looks at each node of a cell so: which triangle stands
 // behind it, in which direction that lies, and by which name the node is known.
-#ifndef WELLSPACE_CORE_REFINE_DOMAIN_NODE_VIEW_H_
-#define WELLSPACE_CORE_REFINE_DOMAIN_NODE_VIEW_H_
+#ifndef WELLSPACE_CORE_REFINE_PLANE_NODE_VIEW_H_
+#define WELLSPACE_CORE_REFINE_PLANE_NODE_VIEW_H_
 
 #include <algorithm>
 #include <array>
@@ -64,4 +64,4 @@ struct NodeView {
 
 }  // namespace wellspace::core
 
-#endif  // WELLSPACE_CORE_REFINE_DOMAIN_NODE_VIEW_H_
+#endif  // WELLSPACE_CORE_REFINE_PLANE_NODE_VIEW_H_

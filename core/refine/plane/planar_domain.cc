@@ -1,4 +1,4 @@
-#include "core/refine/domain/planar_domain.h"
+#include "core/refine/plane/planar_domain.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // Vertices of a domain that are expected: where they are, and how far away.
-#include "core/refine/domain/expected_vertices.h"
+#include "core/refine/plane/expected_vertices.h"
 
 #include <gtest/gtest.h>
 
@@ -16,7 +16,7 @@ class ExpectedVerticesTest : public ::testing::Test {
   ExpectedVerticesTest() { positions_.Clear(VertexId{kCount}); }
 
   void Add(const Point<2>& p, const SegmentPoint& on) {
-    InsertionRequest<2> request;
+    PlaneRequest request;
     request.point.position = p;
     request.place.on = on;
     requests_.push_back(request);
@@ -24,7 +24,7 @@ class ExpectedVerticesTest : public ::testing::Test {
   }
 
   ExtraVertices<2> positions_;
-  std::vector<InsertionRequest<2>> requests_;
+  std::vector<PlaneRequest> requests_;
   ExpectedVertices expected_{positions_, requests_};
 };
 

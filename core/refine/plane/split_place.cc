@@ -1,4 +1,4 @@
-#include "core/refine/domain/split_place.h"
+#include "core/refine/plane/split_place.h"
 
 #include <algorithm>
 #include <cmath>
@@ -28,7 +28,7 @@ double RoundNear(double distance, double room) {
 
 }  // namespace
 
-PlaceInDomain SplitPlace(const VisibleDomain& visible, VertexId v, const MetPart& met) {
+PlanePlace SplitPlace(const VisibleDomain& visible, VertexId v, const MetPart& met) {
   const PlanarDomain& domain = visible.domain();
   const uint32_t segment = met.segment;
   const double length = domain.LengthOf(segment);
@@ -54,7 +54,7 @@ PlaceInDomain SplitPlace(const VisibleDomain& visible, VertexId v, const MetPart
   return RoundPlace(visible, domain.FromNearerEnd(segment, at), met.distance);
 }
 
-PlaceInDomain RoundPlace(const VisibleDomain& visible, SegmentPoint on, double room) {
+PlanePlace RoundPlace(const VisibleDomain& visible, SegmentPoint on, double room) {
   const PlanarDomain& domain = visible.domain();
   const uint32_t segment = on.segment;
   const double length = domain.LengthOf(segment);
@@ -73,16 +73,14 @@ PlaceInDomain RoundPlace(const VisibleDomain& visible, SegmentPoint on, double r
   return {.on = on, .order = order};
 }
 
-bool AreSplitsInOrder(const PlanarDomain& domain, std::span<const InsertionRequest<2>> requests) {
+bool AreSplitsInOrder(const PlanarDomain& domain, std::span<const PlaneRequest> requests) {
   for (size_t i = 0; i < requests.size(); ++i) {
-    const PlaceInDomain& place = requests[i].place;
+    const PlanePlace& place = requests[i].place;
     if (place.order == SplitOrder::kAny) {
       continue;
     }
-    const auto is_there = [&](const InsertionRequest<2>& request) {
-      return request.place.on.segment == place.on.segment;
-    };
-    const std::span<const InsertionRequest<2>> own = requests.first(i);
+    const auto is_there = [&](const PlaneRequest& request) { return request.place.on.segment == place.on.segment; };
+    const std::span<const PlaneRequest> own = requests.first(i);
     const bool is_split = domain.SplitsOf(place.on.segment) > 0 || std::any_of(own.begin(), own.end(), is_there);
     if (is_split != (place.order == SplitOrder::kAfterExpected)) {
       return false;

@@ -1,7 +1,7 @@
 // Vertices of a domain in the plane that are not inserted yet, but that recorded steps are to insert. Rounds::Record
 // makes one of its batch; the rules see it by a VisibleDomain.
-#ifndef WELLSPACE_CORE_REFINE_DOMAIN_EXPECTED_VERTICES_H_
-#define WELLSPACE_CORE_REFINE_DOMAIN_EXPECTED_VERTICES_H_
+#ifndef WELLSPACE_CORE_REFINE_PLANE_EXPECTED_VERTICES_H_
+#define WELLSPACE_CORE_REFINE_PLANE_EXPECTED_VERTICES_H_
 
 #include <algorithm>
 #include <cstdint>
@@ -11,7 +11,7 @@
 #include "core/base/ids.h"
 #include "core/geometry/point.h"
 #include "core/refine/insertion.h"
-#include "core/refine/place_in_domain.h"
+#include "core/refine/plane/plane_place.h"
 #include "core/voronoi/extra_vertices.h"
 
 namespace wellspace::core {
@@ -22,7 +22,7 @@ namespace wellspace::core {
 class ExpectedVertices {
  public:
   // REQUIRES:   `positions` and `requests` are of the same vertices, one after the other, and outlive this.
-  ExpectedVertices(const ExtraVertices<2>& positions, const std::vector<InsertionRequest<2>>& requests)
+  ExpectedVertices(const ExtraVertices<2>& positions, const std::vector<PlaneRequest>& requests)
       : positions_(positions), requests_(requests) {}
 
   // Whether the number of `v` is provisional.
@@ -37,7 +37,7 @@ class ExpectedVertices {
   // Complexity: O(vertices).
   bool AreOn(uint32_t segment) const {
     return std::any_of(requests_.begin(), requests_.end(),
-                       [&](const InsertionRequest<2>& request) { return request.place.on.segment == segment; });
+                       [&](const PlaneRequest& request) { return request.place.on.segment == segment; });
   }
 
   // The squared distance from `p` to the nearest of them, if it is less than `limit_sq`; else that.
@@ -51,12 +51,12 @@ class ExpectedVertices {
   }
 
  private:
-  const InsertionRequest<2>& RequestOf(VertexId v) const { return requests_[Index(v) - Index(positions_.first())]; }
+  const PlaneRequest& RequestOf(VertexId v) const { return requests_[Index(v) - Index(positions_.first())]; }
 
   const ExtraVertices<2>& positions_;
-  const std::vector<InsertionRequest<2>>& requests_;
+  const std::vector<PlaneRequest>& requests_;
 };
 
 }  // namespace wellspace::core
 
-#endif  // WELLSPACE_CORE_REFINE_DOMAIN_EXPECTED_VERTICES_H_
+#endif  // WELLSPACE_CORE_REFINE_PLANE_EXPECTED_VERTICES_H_

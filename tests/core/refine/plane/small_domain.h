@@ -1,6 +1,6 @@
 // Small domains in the plane, made by hand, whose vertices are found by where they are.
-#ifndef WELLSPACE_TESTS_CORE_REFINE_DOMAIN_SMALL_DOMAIN_H_
-#define WELLSPACE_TESTS_CORE_REFINE_DOMAIN_SMALL_DOMAIN_H_
+#ifndef WELLSPACE_TESTS_CORE_REFINE_PLANE_SMALL_DOMAIN_H_
+#define WELLSPACE_TESTS_CORE_REFINE_PLANE_SMALL_DOMAIN_H_
 
 #include <gtest/gtest.h>
 
@@ -14,7 +14,7 @@
 #include "core/features/features.h"
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
-#include "core/refine/domain/planar_domain.h"
+#include "core/refine/plane/planar_domain.h"
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::test {
@@ -83,4 +83,4 @@ struct SmallDomain {
 
 }  // namespace wellspace::test
 
-#endif  // WELLSPACE_TESTS_CORE_REFINE_DOMAIN_SMALL_DOMAIN_H_
+#endif  // WELLSPACE_TESTS_CORE_REFINE_PLANE_SMALL_DOMAIN_H_

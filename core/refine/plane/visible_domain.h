@@ -1,7 +1,7 @@
 // A domain as a step sees it: vertices of the structure and of the domain, and those that a batch expects. By it the
 // rules are the same for the thread that inserts and for those that speculate.
-#ifndef WELLSPACE_CORE_REFINE_DOMAIN_VISIBLE_DOMAIN_H_
-#define WELLSPACE_CORE_REFINE_DOMAIN_VISIBLE_DOMAIN_H_
+#ifndef WELLSPACE_CORE_REFINE_PLANE_VISIBLE_DOMAIN_H_
+#define WELLSPACE_CORE_REFINE_PLANE_VISIBLE_DOMAIN_H_
 
 #include <cstdint>
 #include <span>
@@ -9,9 +9,9 @@
 #include "core/base/ids.h"
 #include "core/features/planar_faces.h"
 #include "core/geometry/point.h"
-#include "core/refine/domain/expected_vertices.h"
-#include "core/refine/domain/planar_domain.h"
-#include "core/refine/place_in_domain.h"
+#include "core/refine/plane/expected_vertices.h"
+#include "core/refine/plane/planar_domain.h"
+#include "core/refine/plane/plane_place.h"
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {
@@ -71,4 +71,4 @@ class VisibleDomain {
 
 }  // namespace wellspace::core
 
-#endif  // WELLSPACE_CORE_REFINE_DOMAIN_VISIBLE_DOMAIN_H_
+#endif  // WELLSPACE_CORE_REFINE_PLANE_VISIBLE_DOMAIN_H_

@@ -1,0 +1,126 @@
+// What a domain is to the refinement, and the domain of a cloud: the box.
+#ifndef WELLSPACE_CORE_REFINE_BOX_DOMAIN_H_
+#define WELLSPACE_CORE_REFINE_BOX_DOMAIN_H_
+
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/base/ids.h"
+#include "core/refine/cell_steps.h"
+#include "core/refine/insertion.h"
+#include "core/refine/step_rules.h"
+#include "core/voronoi/extra_vertices.h"
+#include "core/voronoi/query_structure.h"
+
+namespace wellspace::core {
+
+// A domain is what is meshed of the box of a structure. Refinement and Rounds are templates on it: what they have to
+// know of it they ask by the names below, and what a domain does not need costs it nothing. A kind of domain is a
+// folder beside core/refine/plane, and a line where refine.cc and rounds.cc are instantiated.
+//
+//   kDimension         int: of its points.
+//   Place              What is known of a new vertex beside its position; Nowhere shows the functions.
+//   Request            InsertionRequest<kDimension, Place>: an insertion that a cell asks for.
+//   Rules              What is wrong with a cell and what it asks for, for the criteria of one run. step_rules() are
+//                      the rules of the box; NearestFeatureSq(v, limit_sq, workspace) is how far v is from the nearest
+//                      feature that it is not on, squared, if that is less than the limit, and else the limit.
+//   Expected           The vertices that a batch expects to be inserted, for Rules. Made of their positions and
+//                      requests, ExtraVertices<kDimension> and std::vector<Request>, which grow meanwhile.
+//   Steps<Cells>       The steps of a vertex, with the functions of CellSteps, made of
+//                      (const Rules&, VertexId, double edge_limit_sq, Cells&, StepWorkspace<kDimension>&).
+//   kHasFeatures       bool: whether vertices keep away from features, so that NearestFeatureSq has to be asked.
+//   kNotifiesAll       bool: whether all neighbours get a notice, so that notices are recorded only where they are
+//                      wanted.
+//   kAsksForDistances  bool: whether a request depends on all vertices near its point, and not on the cell alone.
+//   RulesFor(structure, step_rules, expected)
+//                      The Rules of a run, with a null pointer; or for a record, with what its batch expects.
+//   LeastInRounds(least, vertices)
+//                      How many vertices of a bucket are worth rounds, if it is `least` of them elsewhere, while there
+//                      are so many vertices at all.
+//   MakeRoom(n)        Makes room for n more vertices. Beside others that read, Added is called so often at most.
+//   Added(place)       The vertex after the last has been inserted there.
+//   AreInOrder(requests)
+//                      Whether recorded requests, those of one vertex, would be the same now, as far as they depend on
+//                      more than the vertices near to it.
+//   MemoryBytes()      What it takes beside the structure.
+//
+// A domain is a value; where it has much to know, a handle of that. Its functions but MakeRoom and Added are const, and
+// may run at once; RulesFor, and the rules with expected vertices, beside Added, too.
+//
+// What a domain in space will want, and has its place here:
+// - A bound of its own for each node: Rules and Steps alone see bounds; the loop sees edges, as Assessment has them.
+// - Several points for one decision: Steps may keep them, and return them from NextRequest one after the other, with
+//   the same Assessment before each. The loop does not promise that nothing shorter comes between them.
+// - The trial cell of a point that is no vertex: Cells computes those of vertices, and nothing here forbids a function
+//   more. CurrentCells in refine.h and SpeculatedCells in rounds.cc are the two that would have it.
+template <typename T>
+concept RefinedDomain = requires(T domain, const T& same, const typename T::Place& place,
+                                 std::span<const typename T::Request> requests,
+                                 const QueryStructure<T::kDimension>& structure, const StepRules<T::kDimension>& rules,
+                                 const typename T::Expected* expected, size_t least, uint32_t vertices) {
+  { T::kHasFeatures } -> std::convertible_to<bool>;
+  { T::kNotifiesAll } -> std::convertible_to<bool>;
+  { T::kAsksForDistances } -> std::convertible_to<bool>;
+  { same.RulesFor(structure, rules, expected) } -> std::same_as<typename T::Rules>;
+  { same.LeastInRounds(least, vertices) } -> std::same_as<size_t>;
+  domain.MakeRoom(least);
+  domain.Added(place);
+  { same.AreInOrder(requests) } -> std::same_as<bool>;
+  { same.MemoryBytes() } -> std::same_as<uint64_t>;
+};
+
+// The rules in a box.
+//
+// Thread safety: as StepRules.
+template <int D>
+class BoxRules {
+ public:
+  // REQUIRES:   `rules` outlives this.
+  explicit BoxRules(const StepRules<D>& rules) : rules_(rules) {}
+
+  const StepRules<D>& step_rules() const { return rules_; }
+  double NearestFeatureSq(VertexId /*v*/, double limit_sq, Workspace<D>& /*workspace*/) const { return limit_sq; }
+
+ private:
+  const StepRules<D>& rules_;
+};
+
+// The box of a structure, whose faces are known to its cells and to StepRules. Nothing is kept.
+//
+// Thread safety: thread-safe.
+template <int D>
+class BoxDomain {
+ public:
+  static constexpr int kDimension = D;
+  using Place = Nowhere;
+  using Request = InsertionRequest<D, Place>;
+  using Rules = BoxRules<D>;
+  template <typename Cells>
+  using Steps = CellSteps<D, Cells>;
+
+  // Cells know of expected vertices, and the rules ask for no others.
+  struct Expected {
+    Expected(const ExtraVertices<D>& /*positions*/, const std::vector<Request>& /*requests*/) {}
+  };
+
+  static constexpr bool kHasFeatures = false;
+  static constexpr bool kNotifiesAll = false;
+  static constexpr bool kAsksForDistances = false;
+
+  Rules RulesFor(const QueryStructure<D>& /*structure*/, const StepRules<D>& rules,
+                 const Expected* /*expected*/) const {
+    return Rules(rules);
+  }
+  size_t LeastInRounds(size_t least, uint32_t /*vertices*/) const { return least; }
+  void MakeRoom(size_t /*vertices*/) {}
+  void Added(const Place& /*place*/) {}
+  bool AreInOrder(std::span<const Request> /*requests*/) const { return true; }
+  uint64_t MemoryBytes() const { return 0; }
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_REFINE_BOX_DOMAIN_H_
