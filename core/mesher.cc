@@ -3,6 +3,8 @@
 #include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
 #include "core/box_mesher.h"
+#include "core/domain_parameters.h"
+#include "core/plane_mesher.h"
 
 namespace wellspace::core {
 namespace {
@@ -29,6 +31,15 @@ absl::StatusOr<std::unique_ptr<Mesher>> Mesher::Create(const MeshParameters& par
     default:
       return absl::InternalError("ValidateParameters lets no other dimension pass");
   }
+}
+
+absl::StatusOr<std::unique_ptr<Mesher>> Mesher::CreateInDomain(const MeshParameters& parameters,
+                                                               std::span<const double> points, const Features& features,
+                                                               RunContext& context) {
+  WELLSPACE_RETURN_IF_ERROR(ValidateDomainParameters(parameters, features));
+  auto mesher = std::make_unique<PlaneMesher>();
+  WELLSPACE_RETURN_IF_ERROR(mesher->Initialize(parameters, {points, features}, context));
+  return mesher;
 }
 
 }  // namespace wellspace::core

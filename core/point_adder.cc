@@ -208,7 +208,7 @@ VertexId PointAdder<D>::Add(VertexId near, const Point<D>& p, std::span<const do
 template <int D>
 void PointAdder<D>::NoteGiven(VertexId v) {
   if (is_given_ != nullptr) {
-    is_given_->resize(structure_.vertex_count(), true);
+    is_given_->resize(structure_.vertex_count(), false);
     (*is_given_)[Index(v)] = true;
   }
 }

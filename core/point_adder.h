@@ -23,6 +23,15 @@
 
 namespace wellspace::core {
 
+// What adding points depends on beside the structure.
+struct AdderOptions {
+  double merge_distance = 0;  // points no farther than this from a vertex become that one
+  // By vertex, whether it is given: set for those that points become; null: that is not asked for.
+  std::vector<bool>* is_given = nullptr;
+  // That of a domain in the plane, for which points are not merged; null: all of the box is meshed.
+  PointPlacer* placer = nullptr;
+};
+
 // Adds vertices at points, unless there is a vertex already, or one so near that the two are merged. In a domain of the
 // plane they lie on its segments, or in faces that are meshed.
 //
@@ -30,22 +39,18 @@ namespace wellspace::core {
 template <int D>
 class PointAdder {
  public:
-  // Points no farther than `merge_distance` from a vertex become that one. `vertex_added` is called with each vertex
-  // that is added, once the structure has it: the refinement has to know of it. `is_given` has an entry for each
-  // vertex, and is set for those that points become; null: that is not asked for. `placer` is that of a domain in the
-  // plane, for which points are not merged; null: all of the box is meshed.
+  // `vertex_added` is called with each vertex that is added, once the structure has it: the refinement has to know.
   //
   // REQUIRES:   all that is handed in outlives this.
-  PointAdder(const Domain<D>& domain, double merge_distance, QueryStructure<D>& structure,
-             std::function<void(VertexId)> vertex_added, VertexNumbering<D>& numbering, std::vector<bool>* is_given,
-             PointPlacer* placer = nullptr)
+  PointAdder(const Domain<D>& domain, QueryStructure<D>& structure, std::function<void(VertexId)> vertex_added,
+             VertexNumbering<D>& numbering, const AdderOptions& options)
       : domain_(domain),
-        merge_distance_(merge_distance),
         structure_(structure),
         vertex_added_(std::move(vertex_added)),
         numbering_(numbering),
-        is_given_(is_given),
-        placer_(placer) {}
+        merge_distance_(options.merge_distance),
+        is_given_(options.is_given),
+        placer_(options.placer) {}
 
   // Mesher::AddPointsNear.
   absl::StatusOr<std::vector<uint32_t>> AddPoints(std::span<const double> points, std::span<const uint32_t> near,
@@ -79,10 +84,10 @@ class PointAdder {
   void NoteGiven(VertexId v);
 
   const Domain<D>& domain_;
-  const double merge_distance_;
   QueryStructure<D>& structure_;
   const std::function<void(VertexId)> vertex_added_;
   VertexNumbering<D>& numbering_;
+  const double merge_distance_;
   std::vector<bool>* const is_given_;
   PointPlacer* const placer_;
   Workspace<D> workspace_;

@@ -1,5 +1,5 @@
 // A domain in the plane while it is refined: its segments and faces, and where each vertex is on them. MakeDomainCloud
-// makes it of the planar graph. Refinement, DomainMesher and PointPlacer add each vertex here that is added to the
+// makes it of the planar graph. Refinement, PlaneMesher and PointPlacer add each vertex here that is added to the
 // QueryStructure; the rules, the triangles and the estimate read it.
 #ifndef WELLSPACE_CORE_REFINE_PLANE_PLANAR_DOMAIN_H_
 #define WELLSPACE_CORE_REFINE_PLANE_PLANAR_DOMAIN_H_

@@ -10,6 +10,7 @@
 #include <map>
 #include <numbers>
 #include <set>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -73,7 +74,7 @@ void ExpectConforming(const Mesh& mesh) {
   }
 }
 
-TEST(DomainMesherTest, ASquareIsTwoTriangles) {
+TEST(PlaneMesherTest, ASquareIsTwoTriangles) {
   const auto mesh = Input().Ring({{0, 0}, {1, 0}, {1, 1}, {0, 1}}).Make();
   ASSERT_TRUE(mesh.ok()) << mesh.status();
   EXPECT_EQ(mesh->vertex_count(), 4u);
@@ -83,7 +84,7 @@ TEST(DomainMesherTest, ASquareIsTwoTriangles) {
   ExpectConforming(*mesh);
 }
 
-TEST(DomainMesherTest, AHoleStaysEmptyAndItsEdgeHasAMarker) {
+TEST(PlaneMesherTest, AHoleStaysEmptyAndItsEdgeHasAMarker) {
   Input input = Input().Circle({0, 0}, 2, 30, 5).Circle({0.5, 0}, 1, 20, 7);
   input.seeds = {{.at = {0.5, 0}, .is_hole = true}};
   const auto mesh = input.Make();
@@ -111,7 +112,7 @@ TEST(DomainMesherTest, AHoleStaysEmptyAndItsEdgeHasAMarker) {
   }
 }
 
-TEST(DomainMesherTest, RegionsHaveTheirIdsAndAreas) {
+TEST(PlaneMesherTest, RegionsHaveTheirIdsAndAreas) {
   Input input = Input().Ring({{0, 0}, {2, 0}, {2, 1}, {0, 1}});
   input.points.insert(input.points.end(), {1, 0, 1, 1});
   input.ends.insert(input.ends.end(), {4, 5});
@@ -137,7 +138,7 @@ TEST(DomainMesherTest, RegionsHaveTheirIdsAndAreas) {
   }
 }
 
-TEST(DomainMesherTest, SegmentsInTheBox) {
+TEST(PlaneMesherTest, SegmentsInTheBox) {
   Input input;
   input.faces = FaceRule::kBox;
   input.points = {0.2, 0.2, 0.8, 0.7, 0.2, 0.8, 0, 0.5};
@@ -155,7 +156,7 @@ TEST(DomainMesherTest, SegmentsInTheBox) {
   EXPECT_THAT(names, ElementsAre("xmin", "xmax", "ymin", "ymax", "unmarked"));
 }
 
-TEST(DomainMesherTest, PointsOutsideHaveNoVertex) {
+TEST(PlaneMesherTest, PointsOutsideHaveNoVertex) {
   Input input = Input().Ring({{0, 0}, {1, 0}, {1, 1}, {0, 1}});
   input.points.insert(input.points.end(), {0.5, 0.5, 3, 3});
   const auto mesh = input.Make();
@@ -166,7 +167,7 @@ TEST(DomainMesherTest, PointsOutsideHaveNoVertex) {
   ExpectConforming(*mesh);
 }
 
-TEST(DomainMesherTest, SmallAnglesEndAndKeepTheBound) {
+TEST(PlaneMesherTest, SmallAnglesEndAndKeepTheBound) {
   for (const double degrees : {50.0, 30.0, 10.0, 2.0, 0.3, 0.01}) {
     const double angle = degrees * std::numbers::pi / 180;
     const auto mesh = Input().Ring({{0, 0}, {3, 0}, {2 * std::cos(angle), 2 * std::sin(angle)}}).Make();
@@ -181,7 +182,7 @@ TEST(DomainMesherTest, SmallAnglesEndAndKeepTheBound) {
 
 // Two segments with a common end, so close to each other that a vertex on one and its foot on the other round to the
 // same distance from that end.
-TEST(DomainMesherTest, NeedlesThatDoublesHardlySeparateAreMeshed) {
+TEST(PlaneMesherTest, NeedlesThatDoublesHardlySeparateAreMeshed) {
   int meshed = 0;
   for (const double offset : {0.0, 1.0, 78.0, 1e4, 5e5}) {
     for (int gap_exponent = 2; gap_exponent <= 8; ++gap_exponent) {
@@ -211,7 +212,7 @@ TEST(DomainMesherTest, NeedlesThatDoublesHardlySeparateAreMeshed) {
 }
 
 // As they are in maps: places in degrees with six decimals, and two borders that are digitized one after the other.
-TEST(DomainMesherTest, NeedlesOfMapsAreMeshed) {
+TEST(PlaneMesherTest, NeedlesOfMapsAreMeshed) {
   Input needle;
   needle.faces = FaceRule::kBox;
   needle.Segment({-71.501186, 42.041924}, {-71.500424, 42.041923})
@@ -234,7 +235,7 @@ TEST(DomainMesherTest, NeedlesOfMapsAreMeshed) {
 }
 
 // What is rounded is not little beside these: their centres are off by 1e-8 of their lengths.
-TEST(DomainMesherTest, VeryShortSegmentsAreNotSplitByWhatIsRounded) {
+TEST(PlaneMesherTest, VeryShortSegmentsAreNotSplitByWhatIsRounded) {
   for (int turn = 0; turn < 40; ++turn) {
     Input input;
     input.faces = FaceRule::kBox;
@@ -253,7 +254,7 @@ TEST(DomainMesherTest, VeryShortSegmentsAreNotSplitByWhatIsRounded) {
   }
 }
 
-TEST(DomainMesherTest, TheMeshDoesNotDependOnTheOrderOfTheInput) {
+TEST(PlaneMesherTest, TheMeshDoesNotDependOnTheOrderOfTheInput) {
   Input input = Input().Circle({0, 0}, 1, 17, 1).Ring({{-0.2, -0.1}, {0.3, 0}, {0, 0.25}}, 2);
   const auto one = input.Make();
   ASSERT_TRUE(one.ok()) << one.status();
@@ -282,7 +283,7 @@ TEST(DomainMesherTest, TheMeshDoesNotDependOnTheOrderOfTheInput) {
   EXPECT_EQ(one->simplex_count(), two->simplex_count());
 }
 
-TEST(DomainMesherTest, ParametersThatADomainDoesNotHaveAreRefused) {
+TEST(PlaneMesherTest, ParametersThatADomainDoesNotHaveAreRefused) {
   const Input square = Input().Ring({{0, 0}, {1, 0}, {1, 1}, {0, 1}});
   Input input = square;
   input.parameters.dimension = 3;
@@ -305,7 +306,19 @@ TEST(DomainMesherTest, ParametersThatADomainDoesNotHaveAreRefused) {
   EXPECT_EQ(input.Make().status().code(), absl::StatusCode::kResourceExhausted);
 }
 
-TEST(DomainMesherTest, ACancelledRunSaysSo) {
+TEST(PlaneMesherTest, MorePointsThanCanBeNumberedAreRefused) {
+  const double none = 0;
+  const std::span<const double> many(&none, 2 * (kMaxVertices + 1));  // refused before they are read
+  const std::vector<uint32_t> ends = {0, 1};
+  Features features;
+  features.ends = ends;
+  RunContext context;
+  const absl::Status status = Mesher::CreateInDomain({.dimension = 2}, many, features, context).status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(status.message(), HasSubstr("more than vertices can be numbered"));
+}
+
+TEST(PlaneMesherTest, ACancelledRunSaysSo) {
   Input input = Input().Circle({0, 0}, 1, 1000);
   Features features;
   features.ends = input.ends;
@@ -316,12 +329,12 @@ TEST(DomainMesherTest, ACancelledRunSaysSo) {
             absl::StatusCode::kCancelled);
 }
 
-class DomainMesherPropertyTest : public test::SeededTest {
+class PlaneMesherPropertyTest : public test::SeededTest {
  protected:
-  DomainMesherPropertyTest() : SeededTest(0xd0) {}
+  PlaneMesherPropertyTest() : SeededTest(0xd0) {}
 };
 
-TEST_F(DomainMesherPropertyTest, RandomSegmentsOnASmallGridAreMeshed) {
+TEST_F(PlaneMesherPropertyTest, RandomSegmentsOnASmallGridAreMeshed) {
   for (int run = 0; run < 60; ++run) {
     Input input = test::SegmentsOnASmallGrid(random_);
     input.parameters.rho = run % 2 == 0 ? 0 : 1;
@@ -335,7 +348,7 @@ TEST_F(DomainMesherPropertyTest, RandomSegmentsOnASmallGridAreMeshed) {
   }
 }
 
-TEST_F(DomainMesherPropertyTest, SegmentsThatCrossMakeTheSameMeshInAnyOrder) {
+TEST_F(PlaneMesherPropertyTest, SegmentsThatCrossMakeTheSameMeshInAnyOrder) {
   for (int run = 0; run < 12; ++run) {
     Input input;
     input.faces = FaceRule::kBox;
