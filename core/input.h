@@ -2,21 +2,29 @@
 #ifndef WELLSPACE_CORE_INPUT_H_
 #define WELLSPACE_CORE_INPUT_H_
 
+#include <concepts>
 #include <optional>
 #include <span>
-#include <vector>
+#include <utility>
 
 #include "core/features/features.h"
 
 namespace wellspace::core {
 
-// Points, n x dimension, row-major; with features, which are for 2-D alone, they bound a domain in the plane, and
-// without they are a cloud in a box. What it refers to has to outlive it. Points alone are an Input as they are.
+// What a span of doubles is made of without more words: a span, a vector, an array.
+template <typename T>
+concept Coordinates = std::convertible_to<const T&, std::span<const double>>;
+
+// Points, n x dimension, row-major. Without features they are a cloud in a box; with them they make a domain in the
+// plane. Points alone are an input as they are, so that functions which take an Input take points.
+//
+// REQUIRES:   what it refers to outlives it.
 struct Input {
-  Input(std::span<const double> the_points) : points(the_points) {}     // NOLINT(google-explicit-constructor)
-  Input(const std::vector<double>& the_points) : points(the_points) {}  // NOLINT(google-explicit-constructor)
-  Input(std::span<const double> the_points, const Features& the_features)
-      : points(the_points), features(the_features) {}
+  Input() = default;
+  template <Coordinates Points>
+  Input(const Points& of_cloud) : points(of_cloud) {}  // NOLINT(google-explicit-constructor)
+  Input(std::span<const double> of_domain, std::optional<Features> that_bound)
+      : points(of_domain), features(std::move(that_bound)) {}
 
   std::span<const double> points;
   std::optional<Features> features;  // none: a cloud

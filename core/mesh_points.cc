@@ -26,32 +26,15 @@ absl::Status ReserveMemory(const Mesher& mesher, const MeshParameters& parameter
   return context.ReserveMemory(SaturatedCount(bytes * kReserve));
 }
 
-absl::StatusOr<Mesh> MeshPoints(const MeshParameters& parameters, std::span<const double> points, RunContext& context) {
-  WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<Mesher> mesher, Mesher::Create(parameters, points, context));
+absl::StatusOr<Mesh> MeshPoints(const MeshParameters& parameters, const Input& input, RunContext& context) {
+  WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<Mesher> mesher, Mesher::Create(parameters, input, context));
   WELLSPACE_RETURN_IF_ERROR(ReserveMemory(*mesher, parameters, context));
   WELLSPACE_RETURN_IF_ERROR(mesher->Refine(parameters, context));
   return mesher->Extract(parameters.threads, context);
 }
 
-absl::StatusOr<Mesh> MeshFeatures(const MeshParameters& parameters, std::span<const double> points,
-                                  const Features& features, RunContext& context) {
-  WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<Mesher> mesher,
-                             Mesher::CreateInDomain(parameters, points, features, context));
-  WELLSPACE_RETURN_IF_ERROR(ReserveMemory(*mesher, parameters, context));
-  WELLSPACE_RETURN_IF_ERROR(mesher->Refine(parameters, context));
-  return mesher->Extract(parameters.threads, context);
-}
-
-absl::StatusOr<MeshEstimate> EstimateFeatures(const MeshParameters& parameters, std::span<const double> points,
-                                              const Features& features, RunContext& context) {
-  WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<Mesher> mesher,
-                             Mesher::CreateInDomain(parameters, points, features, context));
-  return mesher->Estimate(parameters, context);
-}
-
-absl::StatusOr<MeshEstimate> EstimateMesh(const MeshParameters& parameters, std::span<const double> points,
-                                          RunContext& context) {
-  WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<Mesher> mesher, Mesher::Create(parameters, points, context));
+absl::StatusOr<MeshEstimate> EstimateMesh(const MeshParameters& parameters, const Input& input, RunContext& context) {
+  WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<Mesher> mesher, Mesher::Create(parameters, input, context));
   return mesher->Estimate(parameters, context);
 }
 

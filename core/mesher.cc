@@ -9,37 +9,32 @@
 namespace wellspace::core {
 namespace {
 
-template <int D>
-absl::StatusOr<std::unique_ptr<Mesher>> CreateIn(const MeshParameters& parameters, std::span<const double> points,
+template <typename MesherOfDomain>
+absl::StatusOr<std::unique_ptr<Mesher>> CreateAs(const MeshParameters& parameters, const Input& input,
                                                  RunContext& context) {
-  auto mesher = std::make_unique<BoxMesher<D>>();
-  WELLSPACE_RETURN_IF_ERROR(mesher->Initialize(parameters, points, context));
+  auto mesher = std::make_unique<MesherOfDomain>();
+  WELLSPACE_RETURN_IF_ERROR(mesher->Initialize(parameters, input, context));
   return mesher;
 }
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<Mesher>> Mesher::Create(const MeshParameters& parameters, std::span<const double> points,
+absl::StatusOr<std::unique_ptr<Mesher>> Mesher::Create(const MeshParameters& parameters, const Input& input,
                                                        RunContext& context) {
+  if (input.features.has_value()) {
+    WELLSPACE_RETURN_IF_ERROR(ValidateDomainParameters(parameters, *input.features));
+    return CreateAs<PlaneMesher>(parameters, input, context);
+  }
   WELLSPACE_RETURN_IF_ERROR(ValidateParameters(parameters));
   switch (parameters.dimension) {
 #define WELLSPACE_CASE(D) \
   case D:                 \
-    return CreateIn<D>(parameters, points, context);
+    return CreateAs<BoxMesher<D>>(parameters, input, context);
     WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_CASE)
 #undef WELLSPACE_CASE
     default:
       return absl::InternalError("ValidateParameters lets no other dimension pass");
   }
-}
-
-absl::StatusOr<std::unique_ptr<Mesher>> Mesher::CreateInDomain(const MeshParameters& parameters,
-                                                               std::span<const double> points, const Features& features,
-                                                               RunContext& context) {
-  WELLSPACE_RETURN_IF_ERROR(ValidateDomainParameters(parameters, features));
-  auto mesher = std::make_unique<PlaneMesher>();
-  WELLSPACE_RETURN_IF_ERROR(mesher->Initialize(parameters, {points, features}, context));
-  return mesher;
 }
 
 }  // namespace wellspace::core

@@ -9,7 +9,7 @@
 
 #include "absl/status/statusor.h"
 #include "core/base/run_context.h"
-#include "core/features/features.h"
+#include "core/input.h"
 #include "core/mesh.h"
 #include "core/mesh_parameters.h"
 
@@ -29,27 +29,22 @@ class Mesher {
  public:
   virtual ~Mesher() = default;
 
-  // Builds the tree over `points` in their box.
+  // Builds the tree over the points of `input`, in their box; or in the plane for the domain that its features make of
+  // them (docs/design/features.md). Only what is meshed is in the mesh: points of such a domain that touch none of it
+  // have no vertex.
   //
   // Shapes:     points: n x dimension, row-major; n may be 0 when a domain is given.
   // Units:      any length, the same on every axis.
-  // Complexity: O(n log n + L) for L leaves. Reserves memory for them first.
+  // Complexity: O(n log n + L) for L leaves, and with features that of MakeDomainCloud. Reserves memory for them first.
   // Errors:     INVALID_ARGUMENT (parameters; NaN, infinite or outside coordinates; points closer than double
-  //             arithmetic can serve), RESOURCE_EXHAUSTED (max_vertices, memory of the context), CANCELLED,
+  //             arithmetic can serve; of MakePlanarGraph and FindFaces; and for parameters that a domain with features
+  //             does not have: another dimension than 2 or criterion than kRadiusEdge, a merge_distance, a box beside
+  //             another rule than kBox), RESOURCE_EXHAUSTED (max_vertices, memory of the context), CANCELLED,
   //             DEADLINE_EXCEEDED.
   // Threads:    uses parameters.threads, at most as many as the machine has cores.
   // Source:     [HT08] Figure 3, INITIALIZE.
-  static absl::StatusOr<std::unique_ptr<Mesher>> Create(const MeshParameters& parameters,
-                                                        std::span<const double> points, RunContext& context);
-
-  // The same in the plane for the domain that `features` make of `points`; docs/design/features.md says how. Only what
-  // is meshed is in the mesh: points that touch none of it have no vertex. The tree tells of no size.
-  //
-  // Errors:     as above; INVALID_ARGUMENT of MakePlanarGraph and FindFaces, and for parameters that a domain does not
-  //             have: another dimension or criterion, a merge_distance, a box beside another rule than kBox.
-  static absl::StatusOr<std::unique_ptr<Mesher>> CreateInDomain(const MeshParameters& parameters,
-                                                                std::span<const double> points,
-                                                                const Features& features, RunContext& context);
+  static absl::StatusOr<std::unique_ptr<Mesher>> Create(const MeshParameters& parameters, const Input& input,
+                                                        RunContext& context);
 
   virtual int dimension() const = 0;
   virtual uint64_t vertex_count() const = 0;
@@ -164,27 +159,17 @@ class Mesher {
 // Errors:     those of CheckFeasible and Estimate; RESOURCE_EXHAUSTED, or another of the lender.
 absl::Status ReserveMemory(const Mesher& mesher, const MeshParameters& parameters, RunContext& context);
 
-// Meshes `points` in their box: Create, ReserveMemory, Refine, Extract.
+// Meshes `input`: Create, ReserveMemory, Refine, Extract.
 //
 // Complexity: O(n log n + m) time for m output vertices, O(m) memory.
 // Errors:     those of its parts.
-absl::StatusOr<Mesh> MeshPoints(const MeshParameters& parameters, std::span<const double> points, RunContext& context);
-
-// The same for a domain in the plane.
-absl::StatusOr<Mesh> MeshFeatures(const MeshParameters& parameters, std::span<const double> points,
-                                  const Features& features, RunContext& context);
-
-// Estimates the mesh that MeshFeatures would make, without making it.
-absl::StatusOr<MeshEstimate> EstimateFeatures(const MeshParameters& parameters, std::span<const double> points,
-                                              const Features& features, RunContext& context);
+absl::StatusOr<Mesh> MeshPoints(const MeshParameters& parameters, const Input& input, RunContext& context);
 
 // Estimates the mesh that MeshPoints would make, without making it.
 //
-// Shapes:     points: n x dimension, row-major.
-// Errors:     those of MeshPoints about parameters, points and the context.
+// Errors:     those of MeshPoints about parameters, input and the context.
 // Threads:    thread-safe, as MeshPoints.
-absl::StatusOr<MeshEstimate> EstimateMesh(const MeshParameters& parameters, std::span<const double> points,
-                                          RunContext& context);
+absl::StatusOr<MeshEstimate> EstimateMesh(const MeshParameters& parameters, const Input& input, RunContext& context);
 
 }  // namespace wellspace::core
 

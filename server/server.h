@@ -57,7 +57,7 @@ class Server {
                                                        std::unique_ptr<SessionLog> session_log = nullptr,
                                                        Mesher mesher = core::MeshPoints,
                                                        Estimator estimator = core::EstimateMesh,
-                                                       MesherFactory create_mesher = CreateMesher);
+                                                       MesherFactory create_mesher = core::Mesher::Create);
 
   // Shuts down at once.
   ~Server();

@@ -58,7 +58,7 @@ absl::StatusOr<std::unique_ptr<core::Mesher>> Create(const core::MeshParameters&
   }
   core::Features features;
   features.ends = segments;
-  return core::Mesher::CreateInDomain(parameters, points, features, context);
+  return core::Mesher::Create(parameters, {points, features}, context);
 }
 
 // Checks every promise about `mesh`, of `segments` too.

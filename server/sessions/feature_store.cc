@@ -210,13 +210,16 @@ v1::CrossingRule FeatureStore::crossing_rule() const {
                                                     : v1::CROSSING_RULE_REFUSE;
 }
 
-core::Features FeatureStore::View() const {
-  return {.ends = ends_,
-          .markers = markers_,
-          .is_open = is_open_,
-          .seeds = seeds_,
-          .faces = faces_,
-          .crossings = crossings_};
+std::optional<core::Features> FeatureStore::View() const {
+  if (IsEmpty()) {
+    return std::nullopt;
+  }
+  return core::Features{.ends = ends_,
+                        .markers = markers_,
+                        .is_open = is_open_,
+                        .seeds = seeds_,
+                        .faces = faces_,
+                        .crossings = crossings_};
 }
 
 }  // namespace wellspace::server

@@ -3,6 +3,8 @@
 #define WELLSPACE_SERVER_SESSIONS_FEATURE_STORE_H_
 
 #include <cstdint>
+#include <optional>
+#include <span>
 
 #include "absl/status/status.h"
 #include "core/features/features.h"
@@ -31,6 +33,9 @@ struct FeatureSummary {
   bool has_rules = false;  // some have come
   v1::FaceRule faces = v1::FACE_RULE_UNSPECIFIED;
   v1::CrossingRule crossings = v1::CROSSING_RULE_UNSPECIFIED;
+
+  // Whether a box bounds what is meshed: so it does where there are no features.
+  bool AreInBox() const { return faces == v1::FACE_RULE_UNSPECIFIED || faces == v1::FACE_RULE_BOX; }
 };
 
 // Writes it down in `record`.
@@ -72,8 +77,9 @@ class FeatureStore {
     return segments * (2 * sizeof(uint32_t) + sizeof(int32_t) + sizeof(uint8_t)) + seeds * sizeof(core::FaceSeed);
   }
 
-  // Valid until the next Append.
-  core::Features View() const;
+  // For core::Input: none where this is empty. Valid until the next Append.
+  std::optional<core::Features> View() const;
+  std::span<const uint32_t> ends() const { return ends_; }
 
  private:
   v1::FaceRule face_rule() const;

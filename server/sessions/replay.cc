@@ -71,8 +71,7 @@ absl::StatusOr<std::unique_ptr<core::Mesher>> BeginMesh(const MesherFactory& cre
                                                         const core::MeshParameters& parameters,
                                                         std::span<const double> points, const FeatureStore& features,
                                                         core::RunContext& context) {
-  const core::Features bounds = features.View();
-  return create_mesher(parameters, points, features.IsEmpty() ? nullptr : &bounds, context);
+  return create_mesher(parameters, {points, features.View()}, context);
 }
 
 uint64_t BytesWithVertices(const core::Mesher& mesher, uint64_t count) {

@@ -33,14 +33,11 @@ absl::StatusOr<std::shared_ptr<Operation>> Session::StartOperation(core::MeshPar
   {
     std::lock_guard lock(mutex_);
     WELLSPACE_RETURN_IF_ERROR(CheckReadyForChangeLocked(expected_revision));
-    if (!features_.IsEmpty()) {
-      WELLSPACE_RETURN_IF_ERROR(ValidateForDomain(parameters, features_.View()));
-    }
+    WELLSPACE_RETURN_IF_ERROR(ValidateFor(features_.View(), parameters));
     if (work_.mesh == nullptr) {
       WELLSPACE_RETURN_IF_ERROR(point_account_.CheckMesh(1));  // no mesh has fewer bytes
     }
-    if ((restart || steps_.empty()) && work_.mesh != nullptr &&
-        (features_.IsEmpty() || feature_summary_.faces == v1::FACE_RULE_BOX)) {
+    if ((restart || steps_.empty()) && work_.mesh != nullptr && feature_summary_.AreInBox()) {
       // The box does not change with the points that have come since.
       parameters.domain_low = work_.mesh->figures().domain_low;
       parameters.domain_high = work_.mesh->figures().domain_high;

@@ -31,7 +31,7 @@ absl::Status Session::CheckRemovableLocked(std::span<const uint64_t> numbers) co
   if (const auto twice = std::ranges::adjacent_find(numbers); twice != numbers.end()) {
     return refusal(absl::StrCat("points has ", *twice, " twice; each number is accepted once"));
   }
-  const std::span<const uint32_t> ends = features_.View().ends;
+  const std::span<const uint32_t> ends = features_.ends();
   if (const auto last = std::ranges::max_element(ends); last != ends.end() && numbers.front() <= *last) {
     return refusal(absl::StrCat("points has ", numbers.front(), ", but segments of ", name_, " end at points up to ",
                                 *last, "; those behind can be removed"));

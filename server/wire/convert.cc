@@ -239,8 +239,11 @@ absl::StatusOr<core::MeshParameters> ParametersFromProto(const v1::MeshParameter
   return parameters;
 }
 
-absl::Status ValidateForDomain(const core::MeshParameters& parameters, const core::Features& features) {
-  const absl::Status status = core::ValidateDomainParameters(parameters, features);
+absl::Status ValidateFor(const std::optional<core::Features>& features, const core::MeshParameters& parameters) {
+  if (!features.has_value()) {
+    return absl::OkStatus();
+  }
+  const absl::Status status = core::ValidateDomainParameters(parameters, *features);
   if (status.ok()) {
     return status;
   }

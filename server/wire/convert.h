@@ -3,6 +3,7 @@
 #define WELLSPACE_SERVER_WIRE_CONVERT_H_
 
 #include <cstdint>
+#include <optional>
 
 #include "absl/status/statusor.h"
 #include "absl/time/time.h"
@@ -25,10 +26,11 @@ absl::StatusOr<core::MeshParameters> ParametersFromProto(const v1::MeshParameter
 // Those that ParametersToProto has made, whatever the limits of the server are now.
 absl::StatusOr<core::MeshParameters> ParametersFromRecord(const v1::MeshParameters& message);
 
-// Refuses parameters that a domain with `features` does not have; see core::ValidateDomainParameters.
+// Refuses valid parameters that points with `features`, if there are any, do not have; see
+// core::ValidateDomainParameters.
 //
 // Errors:     INVALID_PARAMETERS with the path of the first wrong field.
-absl::Status ValidateForDomain(const core::MeshParameters& parameters, const core::Features& features);
+absl::Status ValidateFor(const std::optional<core::Features>& features, const core::MeshParameters& parameters);
 
 // The parameters with every default that does not depend on points filled in.
 v1::MeshParameters ParametersToProto(const core::MeshParameters& parameters);

@@ -68,12 +68,12 @@ struct DomainInput {
   }
   absl::StatusOr<core::Mesh> Make() const {
     core::RunContext context;
-    return core::MeshFeatures(parameters, points, features(), context);
+    return core::MeshPoints(parameters, {points, features()}, context);
   }
   std::unique_ptr<core::Mesher> Create() const {
     core::RunContext context;
     absl::StatusOr<std::unique_ptr<core::Mesher>> mesher =
-        core::Mesher::CreateInDomain(parameters, points, features(), context);
+        core::Mesher::Create(parameters, {points, features()}, context);
     EXPECT_TRUE(mesher.ok()) << mesher.status();
     return *std::move(mesher);
   }

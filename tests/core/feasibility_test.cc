@@ -240,7 +240,7 @@ TEST(DomainFeasibility, HopelessSizesOfEveryKindAreRefusedBeforeAnyWorkWithWhatF
       input.parameters.max_vertices = most;
       demand.set(input, 1e-9);
       RunContext context;
-      const absl::Status status = MeshFeatures(input.parameters, input.points, input.features(), context).status();
+      const absl::Status status = MeshPoints(input.parameters, {input.points, input.features()}, context).status();
       const bool is_sample = std::string_view(demand.name).starts_with("size_samples");
       ASSERT_TRUE(IsTooFine(status)) << demand.name << status;
       const std::string text(status.message());

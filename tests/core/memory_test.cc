@@ -131,7 +131,7 @@ TEST(Memory, OfADomainIsReservedForItsGraphThenForTheMeshAndTheRunHoldsNoMore) {
     input.parameters.max_circumradius = size;
     RunContext context;
     Lender lender(context);
-    const absl::StatusOr<Mesh> mesh = MeshFeatures(input.parameters, input.points, input.features(), context);
+    const absl::StatusOr<Mesh> mesh = MeshPoints(input.parameters, {input.points, input.features()}, context);
     ASSERT_TRUE(mesh.ok()) << mesh.status();
     ASSERT_EQ(lender.reserved.size(), 2u);
     // Coordinates, ends, and what a graph, its faces, a sweep over it and a tree need of each at least.
@@ -149,9 +149,9 @@ TEST(Memory, OfADomainIsReservedBeforeItsFirstArrayIsMade) {
     RunContext context;
     Lender lender(context);
     lender.reserve_limit = 4 << 20;
-    const absl::Status status =
-        is_estimate ? EstimateFeatures(input.parameters, input.points, input.features(), context).status()
-                    : MeshFeatures(input.parameters, input.points, input.features(), context).status();
+    const absl::Status status = is_estimate
+                                    ? EstimateMesh(input.parameters, {input.points, input.features()}, context).status()
+                                    : MeshPoints(input.parameters, {input.points, input.features()}, context).status();
     EXPECT_EQ(status.message(), "reserve");
     EXPECT_EQ(lender.reserved.size(), 1u);
     EXPECT_EQ(lender.peak, 0u) << "it was asked for memory that was made";
@@ -163,12 +163,11 @@ TEST(Memory, ADomainThatOutgrowsItInAnyPhaseEndsWithTheLendersErrorAndCanGoOn) {
   RunContext context;
   Lender lender(context);
   lender.refused_phase = Phase::kTree;
-  EXPECT_EQ(Mesher::CreateInDomain(input.parameters, input.points, input.features(), context).status().message(),
-            "allow");
+  EXPECT_EQ(Mesher::Create(input.parameters, {input.points, input.features()}, context).status().message(), "allow");
 
   lender.refused_phase = Phase::kRefinement;
   absl::StatusOr<std::unique_ptr<Mesher>> mesher =
-      Mesher::CreateInDomain(input.parameters, input.points, input.features(), context);
+      Mesher::Create(input.parameters, {input.points, input.features()}, context);
   ASSERT_TRUE(mesher.ok()) << mesher.status();
   EXPECT_EQ((*mesher)->Refine(input.parameters, context).message(), "allow");
 
@@ -194,7 +193,7 @@ TEST(Memory, SizesAtPointsAreAskedForBeforeTheyAreTakenAndCountWhileTheMeshGrows
     RunContext context;
     Lender lender(context);
     absl::StatusOr<std::unique_ptr<Mesher>> mesher =
-        is_domain ? Mesher::CreateInDomain(square.parameters, square.points, square.features(), context)
+        is_domain ? Mesher::Create(square.parameters, {square.points, square.features()}, context)
                   : Mesher::Create(parameters, test::MakeCloud("uniform", 2, 2'000), context);
     ASSERT_TRUE(mesher.ok()) << mesher.status();
     MeshParameters sized = is_domain ? square.parameters : parameters;

@@ -313,7 +313,7 @@ TEST(PlaneMesherTest, MorePointsThanCanBeNumberedAreRefused) {
   Features features;
   features.ends = ends;
   RunContext context;
-  const absl::Status status = Mesher::CreateInDomain({.dimension = 2}, many, features, context).status();
+  const absl::Status status = Mesher::Create({.dimension = 2}, {many, features}, context).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
   EXPECT_THAT(status.message(), HasSubstr("more than vertices can be numbered"));
 }
@@ -325,7 +325,7 @@ TEST(PlaneMesherTest, ACancelledRunSaysSo) {
   features.faces = FaceRule::kHoles;
   RunContext context;
   context.Cancel();
-  EXPECT_EQ(MeshFeatures(input.parameters, input.points, features, context).status().code(),
+  EXPECT_EQ(MeshPoints(input.parameters, {input.points, features}, context).status().code(),
             absl::StatusCode::kCancelled);
 }
 

@@ -345,18 +345,18 @@ TEST(SizeSamplesInDomains, AreKeptAndChecked) {
   MeshParameters parameters{.dimension = 2};
   parameters.size_samples = SmoothSamples(2, 400, 0.03);
   RunContext context;
-  const absl::StatusOr<Mesh> mesh = MeshFeatures(parameters, points, features, context);
+  const absl::StatusOr<Mesh> mesh = MeshPoints(parameters, {points, features}, context);
   ASSERT_TRUE(mesh.ok()) << mesh.status();
   EXPECT_GT(mesh->vertex_count(), 500u);
   EXPECT_EQ(ValidateSizing({2, mesh->points, mesh->simplices}, {.samples = parameters.size_samples.get()}),
             absl::OkStatus());
-  const absl::StatusOr<MeshEstimate> estimate = EstimateFeatures(parameters, points, features, context);
+  const absl::StatusOr<MeshEstimate> estimate = EstimateMesh(parameters, {points, features}, context);
   ASSERT_TRUE(estimate.ok()) << estimate.status();
   EXPECT_NEAR(static_cast<double>(estimate->vertices), static_cast<double>(mesh->vertex_count()),
               0.25 * static_cast<double>(mesh->vertex_count()));
 
   parameters.size_samples = OneSample({2, 0.5}, 1);
-  EXPECT_THAT(std::string(MeshFeatures(parameters, points, features, context).status().message()),
+  EXPECT_THAT(std::string(MeshPoints(parameters, {points, features}, context).status().message()),
               HasSubstr("size_samples.points[0]: (2, 0.5) lies outside the domain from (0, 0) to (1, 1)"));
 }
 

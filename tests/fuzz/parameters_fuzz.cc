@@ -114,10 +114,10 @@ void RequireDomainOrRefusal(const core::MeshParameters& parameters, double max_a
   features.seeds = seeds;
   features.faces = parameters.domain_low.empty() ? core::FaceRule::kHoles : core::FaceRule::kBox;
   core::RunContext context;
-  if (const auto estimate = core::EstimateFeatures(parameters, points, features, context); estimate.ok()) {
+  if (const auto estimate = core::EstimateMesh(parameters, {points, features}, context); estimate.ok()) {
     RequireCounts(*estimate, points.size() / 2);
   }
-  const absl::StatusOr<core::Mesh> mesh = core::MeshFeatures(parameters, points, features, context);
+  const absl::StatusOr<core::Mesh> mesh = core::MeshPoints(parameters, {points, features}, context);
   if (!mesh.ok()) {
     Require(mesh.status().code() == absl::StatusCode::kInvalidArgument ||
                 mesh.status().code() == absl::StatusCode::kResourceExhausted,

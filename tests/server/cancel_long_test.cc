@@ -32,9 +32,9 @@ class CancelTest : public ::testing::Test {
  protected:
   // A mesher that lets the test look at its run.
   Mesher Watched() {
-    return [this](const core::MeshParameters& parameters, std::span<const double> points, core::RunContext& context) {
+    return [this](const core::MeshParameters& parameters, const core::Input& input, core::RunContext& context) {
       run_ = &context;
-      absl::StatusOr<core::Mesh> mesh = core::MeshPoints(parameters, points, context);
+      absl::StatusOr<core::Mesh> mesh = core::MeshPoints(parameters, input, context);
       run_ = nullptr;
       has_returned_ = true;
       return mesh;

@@ -72,22 +72,20 @@ class FakeSessionMesher final : public core::Mesher {
 }  // namespace
 
 MesherFactory ScriptedMesher(PhaseScript script) {
-  return [script = std::move(script)](const core::MeshParameters& parameters, std::span<const double> points,
-                                      const core::Features*,
+  return [script = std::move(script)](const core::MeshParameters& parameters, const core::Input& input,
                                       core::RunContext& context) -> absl::StatusOr<std::unique_ptr<core::Mesher>> {
     context.EnterPhase(core::Phase::kTree);
     WELLSPACE_RETURN_IF_ERROR(script(core::Phase::kTree, context));
-    return std::make_unique<FakeSessionMesher>(parameters, points, script);
+    return std::make_unique<FakeSessionMesher>(parameters, input.points, script);
   };
 }
 
 MesherFactory FixedMesher(core::Mesh mesh) {
   return [shared = std::make_shared<const core::Mesh>(std::move(mesh))](const core::MeshParameters& parameters,
-                                                                        std::span<const double> points,
-                                                                        const core::Features*, core::RunContext&) {
+                                                                        const core::Input& input, core::RunContext&) {
     const auto script = [](core::Phase, core::RunContext& context) { return context.Check(); };
     return absl::StatusOr<std::unique_ptr<core::Mesher>>(
-        std::make_unique<FakeSessionMesher>(parameters, points, script, shared));
+        std::make_unique<FakeSessionMesher>(parameters, input.points, script, shared));
   };
 }
 

@@ -47,10 +47,10 @@ TEST(Server, HealthSaysNotServingWhileStopping) {
   Event started;
   Event go_on;
   ServiceHarness harness(
-      [&](const core::MeshParameters& parameters, std::span<const double> points, core::RunContext&) {
+      [&](const core::MeshParameters& parameters, const core::Input& input, core::RunContext&) {
         started.Set();
         EXPECT_TRUE(go_on.Wait());
-        return MakeFakeMesh(parameters, points);
+        return MakeFakeMesh(parameters, input.points);
       },
       {}, Transport::kLoopback);
   TestCall call(harness.stub());

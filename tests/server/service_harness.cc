@@ -88,20 +88,20 @@ core::Mesh MakeFakeMesh(const core::MeshParameters& parameters, std::span<const 
   return mesh;
 }
 
-absl::StatusOr<core::Mesh> FakeMesher(const core::MeshParameters& parameters, std::span<const double> points,
+absl::StatusOr<core::Mesh> FakeMesher(const core::MeshParameters& parameters, const core::Input& input,
                                       core::RunContext& /*context*/) {
-  return MakeFakeMesh(parameters, points);
+  return MakeFakeMesh(parameters, input.points);
 }
 
-absl::StatusOr<core::MeshEstimate> FakeEstimator(const core::MeshParameters& parameters, std::span<const double> points,
+absl::StatusOr<core::MeshEstimate> FakeEstimator(const core::MeshParameters& parameters, const core::Input& input,
                                                  core::RunContext& /*context*/) {
-  const uint64_t count = points.size() / parameters.dimension;
+  const uint64_t count = input.points.size() / parameters.dimension;
   return core::MeshEstimate{
       .vertices = count, .simplices = 2 * count, .memory_bytes = 3 * count, .tree_leaves = 4 * count};
 }
 
 Mesher EndlessMesher(Event& started) {
-  return [&started](const core::MeshParameters&, std::span<const double>,
+  return [&started](const core::MeshParameters&, const core::Input&,
                     core::RunContext& context) -> absl::StatusOr<core::Mesh> {
     context.EnterPhase(core::Phase::kRefinement);
     started.Set();

@@ -35,14 +35,14 @@ class Event {
 // No mesh, but the arrays of one: the points, then the corners of the box; a simplex per vertex; every input point its
 // own vertex.
 core::Mesh MakeFakeMesh(const core::MeshParameters& parameters, std::span<const double> points);
-absl::StatusOr<core::Mesh> FakeMesher(const core::MeshParameters& parameters, std::span<const double> points,
+absl::StatusOr<core::Mesh> FakeMesher(const core::MeshParameters& parameters, const core::Input& input,
                                       core::RunContext& context);
 
 // A mesher that sets `started` and then works until its context is cancelled.
 Mesher EndlessMesher(Event& started);
 
 // As many vertices as points, and so on.
-absl::StatusOr<core::MeshEstimate> FakeEstimator(const core::MeshParameters& parameters, std::span<const double> points,
+absl::StatusOr<core::MeshEstimate> FakeEstimator(const core::MeshParameters& parameters, const core::Input& input,
                                                  core::RunContext& context);
 
 // The details of an error.
@@ -117,7 +117,7 @@ class ServiceHarness {
  public:
   explicit ServiceHarness(Mesher mesher = FakeMesher, const ServiceOptions& options = {},
                           Transport transport = Transport::kInProcess, Estimator estimator = FakeEstimator,
-                          MesherFactory create_mesher = CreateMesher, const SecurityOptions& security = {},
+                          MesherFactory create_mesher = core::Mesher::Create, const SecurityOptions& security = {},
                           std::unique_ptr<SessionLog> session_log = nullptr);
 
   Server& server() { return *server_; }

@@ -130,10 +130,10 @@ TEST_P(StalledUploads, WorkMayTakeLonger) {
   Event started;
   Event may_end;
   ServiceHarness harness(
-      [&](const core::MeshParameters& parameters, std::span<const double> points, core::RunContext&) {
+      [&](const core::MeshParameters& parameters, const core::Input& input, core::RunContext&) {
         started.Set();
         EXPECT_TRUE(may_end.Wait());
-        return MakeFakeMesh(parameters, points);
+        return MakeFakeMesh(parameters, input.points);
       },
       Options(), GetParam());
   TestCall call(harness.stub());

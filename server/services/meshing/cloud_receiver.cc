@@ -35,10 +35,7 @@ absl::Status CloudReceiver::AcceptEnd() {
     return MakeError(v1::ERROR_REASON_PARAMETERS_MISSING,
                      "the stream ended before any request; send the parameters first", "parameters");
   }
-  if (!features_.IsEmpty()) {
-    WELLSPACE_RETURN_IF_ERROR(ValidateForDomain(parameters_, features_.View()));
-  }
-  return absl::OkStatus();
+  return ValidateFor(features_.View(), parameters_);
 }
 
 absl::Status CloudReceiver::AcceptParameters(const v1::MeshParameters& message) {

@@ -15,10 +15,8 @@ void EstimateMeshCall::Work(NumberChunks& points, Job& job) {
   core::MeshEstimate estimate{};
   absl::Status status = RunGuarded([&] {
     const std::vector<double> coordinates = points.Flatten(job.context());
-    WELLSPACE_ASSIGN_OR_RETURN(
-        estimate, features().IsEmpty()
-                      ? environment().estimator(parameters(), coordinates, job.context())
-                      : core::EstimateFeatures(parameters(), coordinates, features().View(), job.context()));
+    WELLSPACE_ASSIGN_OR_RETURN(estimate,
+                               environment().estimator(parameters(), {coordinates, features().View()}, job.context()));
     return absl::OkStatus();
   });
   std::lock_guard lock(mutex_);

@@ -17,9 +17,7 @@ void MeshPointsCall::Work(NumberChunks& points, Job& job) {
   absl::Status status = RunGuarded([&] {
     const std::vector<double> coordinates = points.Flatten(job.context());
     WELLSPACE_ASSIGN_OR_RETURN(core::Mesh made,
-                               features().IsEmpty()
-                                   ? environment().mesher(parameters(), coordinates, job.context())
-                                   : core::MeshFeatures(parameters(), coordinates, features().View(), job.context()));
+                               environment().mesher(parameters(), {coordinates, features().View()}, job.context()));
     mesh = std::make_shared<MeshChunks>(std::move(made));
     mesh->KeepMemory(job.TakeMemory(mesh->memory_bytes()));
     environment().observability.work().OnMesh(mesh->mesh().vertex_count(), mesh->mesh().simplex_count());

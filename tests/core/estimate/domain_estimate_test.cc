@@ -23,7 +23,7 @@ using test::DomainInput;
 double RatioOf(const DomainInput& input) {
   RunContext context;
   const absl::StatusOr<MeshEstimate> estimate =
-      EstimateFeatures(input.parameters, input.points, input.features(), context);
+      EstimateMesh(input.parameters, {input.points, input.features()}, context);
   const absl::StatusOr<Mesh> mesh = input.Make();
   EXPECT_TRUE(estimate.ok()) << estimate.status();
   EXPECT_TRUE(mesh.ok()) << mesh.status();
@@ -152,7 +152,7 @@ TEST(DomainEstimateTest, NestedRingsThatNoMemoryHoldsAreEstimated) {
   const DomainInput input = NestedSquares(5'000);
   RunContext context;
   const absl::StatusOr<MeshEstimate> estimate =
-      EstimateFeatures(input.parameters, input.points, input.features(), context);
+      EstimateMesh(input.parameters, {input.points, input.features()}, context);
   ASSERT_TRUE(estimate.ok()) << estimate.status();
   // Strips of width w and length l take l / w triangles at least, about: all of them the area over w^2.
   const double least = 4 * 5'000.0 * 5'000.0;
@@ -165,7 +165,7 @@ TEST(DomainEstimateTest, IsCancelledWithinALeaf) {
   const DomainInput input = Star(2000);
   RunContext context;
   absl::StatusOr<std::unique_ptr<Mesher>> mesher =
-      Mesher::CreateInDomain(input.parameters, input.points, input.features(), context);
+      Mesher::Create(input.parameters, {input.points, input.features()}, context);
   ASSERT_TRUE(mesher.ok()) << mesher.status();
   context.Cancel();
   EXPECT_EQ((*mesher)->Estimate(input.parameters, context).status().code(), absl::StatusCode::kCancelled);

@@ -170,7 +170,7 @@ TEST(Locator, HolesHaveNoSimplex) {
   features.seeds = seeds;
   features.faces = FaceRule::kHoles;
   RunContext context;
-  const Mesh mesh = MeshFeatures({.dimension = 2, .max_circumradius = 0.3}, points, features, context).value();
+  const Mesh mesh = MeshPoints({.dimension = 2, .max_circumradius = 0.3}, {points, features}, context).value();
   std::vector<double> places = Places<2>(mesh, 400);
   ExpectLocated<2>(mesh, places);
   const LocatedPoints located = LocatorOf(mesh)->Locate(std::vector<double>{2, 2, 1, 2, 5, 5}, RunContext()).value();

@@ -42,7 +42,7 @@ class SimulatedServer {
  public:
   static constexpr char kFolder[] = "/data";
 
-  SimulatedServer(SimulatedDisk& disk, Plant plant, MesherFactory create_mesher = CreateMesher, int workers = 1)
+  SimulatedServer(SimulatedDisk& disk, Plant plant, MesherFactory create_mesher = core::Mesher::Create, int workers = 1)
       : disk_(disk), plant_(std::move(plant)), create_mesher_(std::move(create_mesher)), workers_(workers) {
     if (!plant_.omits_synchronize.empty()) {
       disk_.OmitSynchronize(plant_.omits_synchronize, [this] { return step_ == plant_.during; });

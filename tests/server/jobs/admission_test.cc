@@ -28,14 +28,15 @@ ServiceOptions LittleMemory(int workers = 2) {
 
 // Reserves a megabyte for each of its points, and gives a mesh when `go` is set.
 Mesher MesherOfMegabytes(Event& reserved, Event& go) {
-  return [&](const core::MeshParameters& parameters, std::span<const double> points,
+  return [&](const core::MeshParameters& parameters, const core::Input& input,
              core::RunContext& context) -> absl::StatusOr<core::Mesh> {
-    if (absl::Status status = context.ReserveMemory(points.size() / parameters.dimension * kMegabyte); !status.ok()) {
+    if (absl::Status status = context.ReserveMemory(input.points.size() / parameters.dimension * kMegabyte);
+        !status.ok()) {
       return status;
     }
     reserved.Set();
     EXPECT_TRUE(go.Wait());
-    return MakeFakeMesh(parameters, points);
+    return MakeFakeMesh(parameters, input.points);
   };
 }
 
@@ -129,7 +130,7 @@ TEST_F(AdmissionBesideAHolder, ACloudThatThereIsNoRoomForMayBeSentAgain) {
 
 TEST(Admission, EstimatesReserveForTheirTree) {
   ServiceHarness harness(FakeMesher, LittleMemory(), Transport::kInProcess,
-                         [](const core::MeshParameters&, std::span<const double>, core::RunContext& context) {
+                         [](const core::MeshParameters&, const core::Input&, core::RunContext& context) {
                            return absl::StatusOr<core::MeshEstimate>(context.ReserveMemory(65 * kMegabyte));
                          });
   grpc::ClientContext context;
@@ -145,7 +146,7 @@ TEST(Admission, EstimatesReserveForTheirTree) {
 TEST(Admission, AJobThatOutgrowsItsReservationEndsAndOthersGoOn) {
   std::atomic<bool> outgrows = true;
   ServiceHarness harness(
-      [&](const core::MeshParameters& parameters, std::span<const double> points,
+      [&](const core::MeshParameters& parameters, const core::Input& input,
           core::RunContext& context) -> absl::StatusOr<core::Mesh> {
         EXPECT_TRUE(context.ReserveMemory(kMegabyte).ok());
         for (uint64_t bytes = kMegabyte; outgrows; bytes += kMegabyte) {
@@ -154,7 +155,7 @@ TEST(Admission, AJobThatOutgrowsItsReservationEndsAndOthersGoOn) {
             return status;
           }
         }
-        return MakeFakeMesh(parameters, points);
+        return MakeFakeMesh(parameters, input.points);
       },
       LittleMemory());
   TestCall call(harness.stub());
@@ -175,19 +176,19 @@ TEST(Admission, SmallJobsOfATenantFinishWhileLargeOnesOfAnotherWait) {
       folder.Write("tokens", *MakeTokenLine("large", large_token) + "\n" + *MakeTokenLine("small", small_token) + "\n");
   Event holds;
   Event go;
-  const Mesher mesher = [&](const core::MeshParameters& parameters, std::span<const double> points,
+  const Mesher mesher = [&](const core::MeshParameters& parameters, const core::Input& input,
                             core::RunContext& context) -> absl::StatusOr<core::Mesh> {
-    if (points.size() > 3) {  // a large one
+    if (input.points.size() > 3) {  // a large one
       if (absl::Status status = context.ReserveMemory(40 * kMegabyte); !status.ok()) {
         return status;
       }
       holds.Set();
       EXPECT_TRUE(go.Wait());
-      return MakeFakeMesh(parameters, points);
+      return MakeFakeMesh(parameters, input.points);
     }
-    return core::MeshPoints(parameters, points, context);
+    return core::MeshPoints(parameters, input, context);
   };
-  ServiceHarness harness(mesher, LittleMemory(), Transport::kLoopback, FakeEstimator, CreateMesher, security);
+  ServiceHarness harness(mesher, LittleMemory(), Transport::kLoopback, FakeEstimator, core::Mesher::Create, security);
   TestCall first(harness.stub(), std::nullopt, large_token);
   SendPoints(first, 2);
   ASSERT_TRUE(holds.Wait());
@@ -249,13 +250,12 @@ TEST_F(AdmissionBesideAHolder, CancelWhileWaitingForMemoryGivesAllBack) {
 TEST(Admission, SmallWorkWaitsForNoLargeMesh) {
   Event begun;
   Event may_end;
-  const auto mesher = [&](const core::MeshParameters& parameters, std::span<const double> points,
-                          core::RunContext& context) {
-    if (points.size() > 3 * 1000) {
+  const auto mesher = [&](const core::MeshParameters& parameters, const core::Input& input, core::RunContext& context) {
+    if (input.points.size() > 3 * 1000) {
       begun.Set();
       EXPECT_TRUE(may_end.Wait());
     }
-    return core::MeshPoints(parameters, points, context);
+    return core::MeshPoints(parameters, input, context);
   };
   ServiceHarness harness(mesher, {.workers = 1, .small_workers = 1, .max_queued_jobs = 1, .max_jobs_per_tenant = 2});
   const auto start = [&harness](size_t points) {

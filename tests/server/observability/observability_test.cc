@@ -391,10 +391,10 @@ TEST(Probes, AServerThatStopsIsAliveAndNotReadyAtOnce) {
   options.observability.metrics_listen = "127.0.0.1:0";
   const absl::StatusOr<std::unique_ptr<Server>> server =
       Server::Start(options, std::make_shared<spdlog::logger>("none"), nullptr,
-                    [&](const core::MeshParameters& parameters, std::span<const double> points, core::RunContext&) {
+                    [&](const core::MeshParameters& parameters, const core::Input& input, core::RunContext&) {
                       started.Set();
                       EXPECT_TRUE(go_on.Wait());
-                      return MakeFakeMesh(parameters, points);
+                      return MakeFakeMesh(parameters, input.points);
                     });
   ASSERT_TRUE(server.ok()) << server.status();
   const absl::StatusOr<std::shared_ptr<grpc::Channel>> channel = (*server)->InProcessChannel();

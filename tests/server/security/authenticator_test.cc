@@ -20,7 +20,7 @@ const std::string kToken(40, 'k');
 // A server that wants tokens.
 class TokensWanted : public ::testing::Test {
  protected:
-  TokensWanted() : harness_(FakeMesher, {}, Transport::kLoopback, FakeEstimator, CreateMesher, Security()) {}
+  TokensWanted() : harness_(FakeMesher, {}, Transport::kLoopback, FakeEstimator, core::Mesher::Create, Security()) {}
 
   SecurityOptions Security() {
     SecurityOptions security;

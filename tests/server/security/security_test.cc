@@ -40,7 +40,7 @@ class SecurityTest : public ::testing::Test {
  protected:
   void Start() {
     harness_ = std::make_unique<ServiceHarness>(FakeMesher, ServiceOptions(), Transport::kLoopback, FakeEstimator,
-                                                CreateMesher, security_);
+                                                core::Mesher::Create, security_);
   }
 
   // Certificates for a server and its clients.

@@ -26,7 +26,7 @@ class DeltaDownloadTest : public ::testing::Test {
   void Start(const ServiceOptions& options = {}) {
     calls_.reset();
     service_.reset();
-    service_.emplace(FakeMesher, options, Transport::kInProcess, FakeEstimator, CreateMesher, SecurityOptions(),
+    service_.emplace(FakeMesher, options, Transport::kInProcess, FakeEstimator, core::Mesher::Create, SecurityOptions(),
                      DurableLog::Open({.folder = folder_.path()}).value());
     calls_.emplace(service_->channel());
   }

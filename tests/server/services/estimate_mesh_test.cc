@@ -49,9 +49,9 @@ grpc::Status Estimate(EstimateCall& call, const v1::MeshParameters& parameters, 
 }
 
 Estimator EndlessEstimator(Event& started) {
-  return [mesher = EndlessMesher(started)](const core::MeshParameters& parameters, std::span<const double> points,
+  return [mesher = EndlessMesher(started)](const core::MeshParameters& parameters, const core::Input& input,
                                            core::RunContext& context) -> absl::StatusOr<core::MeshEstimate> {
-    return mesher(parameters, points, context).status();
+    return mesher(parameters, input, context).status();
   };
 }
 

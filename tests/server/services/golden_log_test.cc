@@ -81,7 +81,8 @@ class OtherMeshesLog final : public SessionLog {
 // A server over a folder, and what is asked of it.
 class GoldenServer {
  public:
-  GoldenServer(const std::string& folder, MesherFactory create_mesher = CreateMesher, bool makes_other_meshes = false) {
+  GoldenServer(const std::string& folder, MesherFactory create_mesher = core::Mesher::Create,
+               bool makes_other_meshes = false) {
     std::unique_ptr<SessionLog> log = DurableLog::Open({.folder = folder}).value();
     if (makes_other_meshes) {
       log = std::make_unique<OtherMeshesLog>(std::move(log));
@@ -377,7 +378,7 @@ TEST(GoldenLog, AnotherMeshingVersionKeepsMeshesAndBeginsAnew) {
     SCOPED_TRACE(golden);
     const std::string expected = ReadText(golden / "expected.txt");
     const TestFolder folder;
-    GoldenServer server(CopyOf(golden, folder), CreateMesher, /*makes_other_meshes=*/true);
+    GoldenServer server(CopyOf(golden, folder), core::Mesher::Create, /*makes_other_meshes=*/true);
     for (const std::string& line : server.Describe()) {
       if (line.find("parked") == std::string::npos) {  // whose operation has gone on, to a mesh of this build
         EXPECT_NE(expected.find(line), std::string::npos) << line;

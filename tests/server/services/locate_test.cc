@@ -17,7 +17,7 @@ using ::testing::HasSubstr;
 class LocateTest : public ::testing::Test {
  protected:
   explicit LocateTest(const ServiceOptions& options = {})
-      : harness_(core::MeshPoints, options, Transport::kInProcess, core::EstimateMesh, CreateMesher),
+      : harness_(core::MeshPoints, options, Transport::kInProcess, core::EstimateMesh, core::Mesher::Create),
         calls_(harness_.channel()) {}
 
   std::string CreateRefined() {

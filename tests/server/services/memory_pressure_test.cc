@@ -34,7 +34,7 @@ class MemoryPressureTest : public ::testing::Test {
       log = DurableLog::Open({.folder = folder_->path()}).value();
     }
     service_.emplace(core::MeshPoints, ServiceOptions{.workers = 2, .max_memory_bytes = max_memory_bytes},
-                     Transport::kInProcess, FakeEstimator, CreateMesher, SecurityOptions(), std::move(log));
+                     Transport::kInProcess, FakeEstimator, core::Mesher::Create, SecurityOptions(), std::move(log));
     calls_.emplace(service_->channel());
   }
 

@@ -154,12 +154,12 @@ TEST_P(MeshPointsOver, TwoClientsAtOnce) {
   Event first;
   Event second;
   ServiceHarness harness(
-      [&](const core::MeshParameters& parameters, std::span<const double> points, core::RunContext&) {
-        Event& own = points.size() == 30 ? first : second;
-        Event& others = points.size() == 30 ? second : first;
+      [&](const core::MeshParameters& parameters, const core::Input& input, core::RunContext&) {
+        Event& own = input.points.size() == 30 ? first : second;
+        Event& others = input.points.size() == 30 ? second : first;
         own.Set();
         EXPECT_TRUE(others.Wait());
-        return MakeFakeMesh(parameters, points);
+        return MakeFakeMesh(parameters, input.points);
       },
       options, GetParam());
   std::vector<std::thread> clients;

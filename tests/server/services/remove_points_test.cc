@@ -27,8 +27,8 @@ class RemovePointsTest : public ::testing::TestWithParam<bool> {
     if (GetParam()) {
       log = DurableLog::Open({.folder = folder_.path()}).value();
     }
-    service_.emplace(FakeMesher, options_, Transport::kInProcess, FakeEstimator, CreateMesher, SecurityOptions(),
-                     std::move(log));
+    service_.emplace(FakeMesher, options_, Transport::kInProcess, FakeEstimator, core::Mesher::Create,
+                     SecurityOptions(), std::move(log));
     calls_.emplace(service_->channel());
   }
 

@@ -54,13 +54,13 @@ class RestartTest : public ::testing::Test {
         << report.status() << (report.ok() && !report->problems.empty() ? report->problems[0] : "");
   }
 
-  void Start(MesherFactory create_mesher = CreateMesher) {
+  void Start(MesherFactory create_mesher = core::Mesher::Create) {
     absl::StatusOr<std::unique_ptr<DurableLog>> log = DurableLog::Open({.folder = folder_.path()});
     ASSERT_TRUE(log.ok()) << log.status();
     StartOn(*std::move(log), std::move(create_mesher));
   }
 
-  void StartOn(std::unique_ptr<SessionLog> log, MesherFactory create_mesher = CreateMesher) {
+  void StartOn(std::unique_ptr<SessionLog> log, MesherFactory create_mesher = core::Mesher::Create) {
     service_.emplace(FakeMesher, options_, Transport::kInProcess, FakeEstimator, std::move(create_mesher),
                      SecurityOptions(), std::move(log));
     calls_.emplace(service_->channel());
@@ -72,7 +72,7 @@ class RestartTest : public ::testing::Test {
   }
 
   // Ends the server, and starts it again. What runs is given up, as after SIGTERM.
-  void Restart(MesherFactory create_mesher = CreateMesher) {
+  void Restart(MesherFactory create_mesher = core::Mesher::Create) {
     Stop();
     Start(std::move(create_mesher));
   }

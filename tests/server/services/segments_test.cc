@@ -25,7 +25,7 @@ constexpr uint64_t kSeeds = 2;
 class SegmentsTest : public ::testing::Test {
  protected:
   explicit SegmentsTest(const ServiceOptions& options = {})
-      : harness_(core::MeshPoints, options, Transport::kInProcess, FakeEstimator, CreateMesher),
+      : harness_(core::MeshPoints, options, Transport::kInProcess, FakeEstimator, core::Mesher::Create),
         calls_(harness_.channel()) {}
 
   std::string Create(int dimension = 2) {

@@ -20,7 +20,7 @@ using ::testing::HasSubstr;
 class SetSizesTest : public ::testing::Test {
  protected:
   explicit SetSizesTest(const ServiceOptions& options = {})
-      : harness_(core::MeshPoints, options, Transport::kInProcess, core::EstimateMesh, CreateMesher),
+      : harness_(core::MeshPoints, options, Transport::kInProcess, core::EstimateMesh, core::Mesher::Create),
         calls_(harness_.channel()) {}
 
   // A session with points in the unit square.

@@ -37,8 +37,8 @@ class StorageQuotaTest : public ::testing::TestWithParam<bool> {
       ASSERT_TRUE(opened.ok()) << opened.status();
       log = *std::move(opened);
     }
-    service_.emplace(FakeMesher, options_, Transport::kInProcess, FakeEstimator, CreateMesher, SecurityOptions(),
-                     std::move(log));
+    service_.emplace(FakeMesher, options_, Transport::kInProcess, FakeEstimator, core::Mesher::Create,
+                     SecurityOptions(), std::move(log));
     calls_.emplace(service_->channel());
   }
 

@@ -40,7 +40,7 @@ SecurityOptions TwoTenants(TemporaryFolder& folder) {
 class TenantsTest : public ::testing::Test {
  protected:
   TenantsTest()
-      : harness_(FakeMesher, {}, Transport::kLoopback, FakeEstimator, CreateMesher, TwoTenants(folder_)),
+      : harness_(FakeMesher, {}, Transport::kLoopback, FakeEstimator, core::Mesher::Create, TwoTenants(folder_)),
         acme_(ClientWith(kAcme)),
         beta_(ClientWith(kBeta)) {
     session_ = acme_.CreateSession(Options(), First()).value().name;
@@ -249,8 +249,8 @@ class QuotasTest : public ::testing::Test {
 
   TemporaryFolder folder_;
   Event started_;
-  ServiceHarness harness_{EndlessMesher(started_), Options(),    Transport::kLoopback,
-                          FakeEstimator,           CreateMesher, TwoTenants(folder_)};
+  ServiceHarness harness_{EndlessMesher(started_), Options(),          Transport::kLoopback, FakeEstimator,
+                          core::Mesher::Create,    TwoTenants(folder_)};
   const std::unique_ptr<v1::SessionService::Stub> sessions_ = v1::SessionService::NewStub(harness_.channel());
   const std::unique_ptr<v1::OperationService::Stub> operations_ = v1::OperationService::NewStub(harness_.channel());
 };

@@ -23,8 +23,7 @@ class CrashingWorkTest : public ::testing::TestWithParam<int> {
   static uint64_t LimitOf(int number) { return 10'000 + static_cast<uint64_t>(number); }
   bool IsPoison(int number) const { return poison_.contains(number); }
 
-  absl::StatusOr<std::unique_ptr<core::Mesher>> Create(const core::MeshParameters& parameters,
-                                                       std::span<const double> points, const core::Features* features,
+  absl::StatusOr<std::unique_ptr<core::Mesher>> Create(const core::MeshParameters& parameters, const core::Input& input,
                                                        core::RunContext& context) {
     // All that may run beside this one begins before it goes on.
     while (!disk_.is_dead() && server_.RunJobBeside()) {
@@ -33,7 +32,7 @@ class CrashingWorkTest : public ::testing::TestWithParam<int> {
       disk_.DieAt(disk_.operations());
       (void)disk_.files().Remove("/anything");
     }
-    return CreateMesher(parameters, points, features, context);
+    return core::Mesher::Create(parameters, input, context);
   }
 
   void MakeSessions() {
@@ -50,12 +49,11 @@ class CrashingWorkTest : public ::testing::TestWithParam<int> {
   }
 
   SimulatedDisk disk_;
-  SimulatedServer server_{disk_,
-                          {},
-                          [this](const auto& parameters, auto points, const auto* features, auto& context) {
-                            return Create(parameters, points, features, context);
-                          },
-                          kWorkers};
+  SimulatedServer server_{
+      disk_,
+      {},
+      [this](const auto& parameters, const auto& input, auto& context) { return Create(parameters, input, context); },
+      kWorkers};
   std::set<int> poison_;
   std::vector<std::string> names_;
 };

@@ -43,7 +43,7 @@ TEST(FeatureStore, KeepsMarkersAndRingsOfSegmentsFromManyChunks) {
   store.Append(Chunk({0, 1, 1, 2}));
   store.Append(Chunk({2, 3, 3, 4, 4, 5}, {7, 8, 9}, true), 1);
   store.Append(Chunk({5, 6}));
-  const core::Features features = store.View();
+  const core::Features features = *store.View();
   EXPECT_THAT(features.ends, ElementsAre(0, 1, 1, 2, 3, 4, 4, 5, 5, 6));
   EXPECT_THAT(features.markers, ElementsAre(0, 0, 8, 9, 0));
   EXPECT_THAT(features.is_open, ElementsAre(0, 0, 1, 1, 0));
@@ -59,8 +59,8 @@ TEST(FeatureStore, WhatWasAppendedCanBeTakenBack) {
   store.Append(Chunk({2, 3}, {7}));
   store.Append(Faces(v1::FACE_RULE_HOLES, {1, 2}, 0.5));
   store.TakeBack(before);
-  EXPECT_THAT(store.View().ends, ElementsAre(0, 1, 1, 2));
-  EXPECT_THAT(store.View().markers, ElementsAre(0, 0));
+  EXPECT_THAT(store.View()->ends, ElementsAre(0, 1, 1, 2));
+  EXPECT_THAT(store.View()->markers, ElementsAre(0, 0));
   EXPECT_EQ(store.seed_count(), 0u);
   EXPECT_FALSE(store.Summary().has_rules);
   EXPECT_EQ(store.Summary().faces, v1::FACE_RULE_BOX) << "segments alone";
@@ -76,8 +76,8 @@ TEST(FeatureStore, TheLastRulesHoldAndSeedsAddUp) {
   EXPECT_TRUE(store.HasOtherRules(Faces(v1::FACE_RULE_HOLES)));
   EXPECT_EQ(store.Summary().faces, v1::FACE_RULE_EVEN_ODD);
   ASSERT_EQ(store.seed_count(), 2u);
-  EXPECT_EQ(store.View().seeds[0].max_area, 0.5);
-  EXPECT_EQ(store.View().seeds[1].at[1], 6);
+  EXPECT_EQ(store.View()->seeds[0].max_area, 0.5);
+  EXPECT_EQ(store.View()->seeds[1].at[1], 6);
 }
 
 TEST(FeatureStore, FindsTheFirstThatIsAnother) {
@@ -96,7 +96,7 @@ TEST(FeatureStore, FindsTheFirstThatIsAnother) {
   EXPECT_EQ(store.CountEqual(1, 1, polygon), 0u);
   store.Append(polygon);
   EXPECT_EQ(store.CountEqual(2, 1, polygon), 1u);
-  EXPECT_EQ(store.View().seeds[2].segment_count, 3u);
+  EXPECT_EQ(store.View()->seeds[2].segment_count, 3u);
   polygon.mutable_seeds(0)->mutable_polygon()->set_first(1);
   EXPECT_EQ(store.CountEqual(2, 1, polygon), 0u);
 }

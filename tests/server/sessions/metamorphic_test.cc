@@ -98,7 +98,7 @@ class Process {
  public:
   explicit Process(const std::string& folder)
       : backend_({.workers = 2}, authenticator_, observability_, logger_, DurableLog::Open({.folder = folder}).value(),
-                 FakeMesher, FakeEstimator, CreateMesher) {
+                 FakeMesher, FakeEstimator, core::Mesher::Create) {
     EXPECT_TRUE(backend_.Restore().ok());
   }
 

@@ -60,8 +60,8 @@ class OperationCancelTest : public ::testing::Test {
   Authenticator authenticator_;
   Connections connections_{{}, logger_};
   Observability observability_{{}, logger_, connections_, [](const grpc::ServerContextBase&) { return ""; }};
-  Backend backend_{options_,   authenticator_, observability_, logger_, std::make_unique<EphemeralLog>(),
-                   FakeMesher, FakeEstimator,  CreateMesher};
+  Backend backend_{options_,   authenticator_, observability_,      logger_, std::make_unique<EphemeralLog>(),
+                   FakeMesher, FakeEstimator,  core::Mesher::Create};
   MemoryBudget memory_{0};
   EphemeralLog log_;
   const Clock clock_{.wall = [this] {

@@ -173,18 +173,17 @@ class BreakableMesher final : public core::Mesher {
 };
 
 MesherFactory BreakableMeshers(Script& script) {
-  return
-      [&script](const core::MeshParameters& parameters, std::span<const double> points, const core::Features* features,
-                core::RunContext& context) -> absl::StatusOr<std::unique_ptr<core::Mesher>> {
-        script.NoteCreated();
-        absl::StatusOr<std::unique_ptr<core::Mesher>> mesher =
-            Broken(script, Call::kCreate, context,
-                   [&](core::RunContext& inner) { return CreateMesher(parameters, points, features, inner); });
-        if (!mesher.ok()) {
-          return mesher.status();
-        }
-        return std::make_unique<BreakableMesher>(*std::move(mesher), script);
-      };
+  return [&script](const core::MeshParameters& parameters, const core::Input& input,
+                   core::RunContext& context) -> absl::StatusOr<std::unique_ptr<core::Mesher>> {
+    script.NoteCreated();
+    absl::StatusOr<std::unique_ptr<core::Mesher>> mesher =
+        Broken(script, Call::kCreate, context,
+               [&](core::RunContext& inner) { return core::Mesher::Create(parameters, input, inner); });
+    if (!mesher.ok()) {
+      return mesher.status();
+    }
+    return std::make_unique<BreakableMesher>(*std::move(mesher), script);
+  };
 }
 
 // The arrays of a mesh as they came.

@@ -75,7 +75,7 @@ ErrorDetails RefusalOf(const std::vector<uint32_t>& ends, const std::vector<int3
   features.seeds = seeds;
   features.faces = faces;
   core::RunContext context;
-  return DetailsOf(core::MeshFeatures({.dimension = 2}, points, features, context).status());
+  return DetailsOf(core::MeshPoints({.dimension = 2}, {points, features}, context).status());
 }
 
 TEST(ToGrpcStatus, ErrorsOfADomainNameWhatIsWrong) {
