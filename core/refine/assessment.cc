@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "core/base/dimensions.h"
+#include "core/refine/assess_nodes.h"
 
 namespace wellspace::core {
 namespace {
@@ -76,20 +77,15 @@ NodePlanes LookAtPlanes(const Polytope<D>& cell, const CellNode<D>& node, FaceMa
   return found;
 }
 
-// A node that may be repaired, and the nearest of its generators.
+// Decides between bad nodes with one bound by what they are, whatever their numbers: the farther comes first.
 template <int D>
-struct Candidate {
-  double bound_sq = Assessment::kNone;
+struct NodeRank {
   const CellNode<D>* node = nullptr;
-  VertexId generator = kNoVertex;
+  VertexId generator = kNoVertex;  // the nearest
 
-  // Whether it is to be repaired sooner: decided by what the node is, whatever its number.
-  bool IsBefore(const Candidate& other) const {
-    if (bound_sq != other.bound_sq || other.node == nullptr) {
-      return bound_sq < other.bound_sq;
-    }
-    return std::tie(other.node->radius_sq, other.node->x, generator) <
-           std::tie(node->radius_sq, node->x, other.generator);
+  bool operator<(const NodeRank& other) const {
+    return std::tie(node->radius_sq, node->x, other.generator) <
+           std::tie(other.node->radius_sq, other.node->x, generator);
   }
 };
 
@@ -98,35 +94,27 @@ struct Candidate {
 template <int D>
 Assessment Assess(const Polytope<D>& cell, FaceMask site_faces, const MeshCriteria<D>& criteria, double edge_limit_sq) {
   Assessment result;
-  Candidate<D> first;
   double nearest_face = Assessment::kNone;
   const double rho_sq = criteria.rho * criteria.rho;
   const bool has_sizes = !criteria.sizes.IsUnbounded();
   SizeHint hint;
   const double cell_edge_sq = criteria.criterion == Criterion::kWellSpaced ? ShortestEdgeSq(cell) : Assessment::kNone;
-  for (size_t i = 0; i < cell.nodes().size(); ++i) {
-    const CellNode<D>& node = cell.nodes()[i];
+  const auto look = [&](const CellNode<D>& node) -> NodeVerdict<NodeRank<D>> {
     result.radius_sq = std::max(result.radius_sq, node.radius_sq);
     if (!has_sizes && IsPlainlyGood(cell, node, rho_sq, cell_edge_sq)) {
-      continue;
+      return {};
     }
     const auto [edge_sq, edge_plane, generator, on_face, on_own_face] =
         LookAtPlanes(cell, node, site_faces, nearest_face, result);
     if (on_face) {
-      continue;
+      return {};
     }
     double bound_sq = rho_sq * std::min(edge_sq, cell_edge_sq);
     bool is_too_large = false;
     if (node.radius_sq <= bound_sq) {
       bound_sq = Assessment::kNone;
     }
-    if (on_own_face) {
-      if (bound_sq != Assessment::kNone) {
-        result.own_boundary_edge_sq = std::min(result.own_boundary_edge_sq, bound_sq / rho_sq);
-      }
-      continue;
-    }
-    if (has_sizes) {
+    if (has_sizes && !on_own_face) {
       Point<D> x = cell.site();
       for (int k = 0; k < D; ++k) {
         x[k] += node.x[k];
@@ -137,19 +125,9 @@ Assessment Assess(const Polytope<D>& cell, FaceMask site_faces, const MeshCriter
         is_too_large = true;
       }
     }
-    if (bound_sq == Assessment::kNone) {
-      continue;
-    }
-    if (bound_sq > rho_sq * edge_limit_sq) {
-      result.next_edge_sq = std::min(result.next_edge_sq, bound_sq / rho_sq);
-    } else if (const Candidate<D> candidate{bound_sq, &node, generator}; candidate.IsBefore(first)) {
-      first = candidate;
-      result.bound_sq = bound_sq;
-      result.bad_node = static_cast<int>(i);
-      result.bad_plane = edge_plane;
-      result.is_too_large = is_too_large;
-    }
-  }
+    return {bound_sq, is_too_large, on_own_face, edge_plane, {&node, generator}};
+  };
+  AssessNodes(cell, rho_sq, edge_limit_sq, look, result);
   return result;
 }
 

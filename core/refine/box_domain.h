@@ -51,7 +51,7 @@ namespace wellspace::core {
 // may run at once; RulesFor, and the rules with expected vertices, beside Added, too.
 //
 // What a domain in space will want, and has its place here:
-// - A bound of its own for each node: Rules and Steps alone see bounds; the loop sees edges, as Assessment has them.
+// - A bound of its own for each node: AssessNodes takes one with every node; the loop sees edges alone.
 // - Several points for one decision: Steps may keep them, and return them from NextRequest one after the other, with
 //   the same Assessment before each. The loop does not promise that nothing shorter comes between them.
 // - The trial cell of a point that is no vertex: Cells computes those of vertices, and nothing here forbids a function

@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "core/geometry/segment.h"
+#include "core/refine/assess_nodes.h"
 #include "core/refine/plane/split_place.h"
 #include "core/refine/rounding.h"
 #include "core/refine/steiner_point.h"
@@ -159,42 +160,33 @@ PlaneAssessment PlaneRules::AssessCell(VertexId v, Polytope<2>& cell, std::span<
   }
   const FacesAround around(domain(), v);
   const double rho_sq = rules_.criteria().rho * rules_.criteria().rho;
-  std::tuple<double, NodeName, Point<2>> best;  // of the bad node; its place, since some on the clip have no name
-  for (size_t i = 0; i < cell.nodes().size(); ++i) {
-    const CellNode<2>& node = cell.nodes()[i];
+  // The farthest first; then by name and place, since some on the clip have no name.
+  using Rank = std::tuple<double, NodeName, Point<2>>;
+  const auto look = [&](const CellNode<2>& node) -> NodeVerdict<Rank> {
     const NodeView view(cell, node);
     const uint32_t face = around.Toward(view.toward);
     if (!domain().faces().IsMeshed(face)) {
-      continue;
+      return {};
     }
     result.radius_sq = std::max(result.radius_sq, node.radius_sq);
     result.is_clipped = result.is_clipped || !view.IsTriangle();
     const Bound bound = BoundOf(cell, node, view, face);
     if (bound.sq == Assessment::kNone) {
-      continue;
+      return {};
     }
     if (IsCrossed(v, view)) {
-      result.own_boundary_edge_sq = std::min(result.own_boundary_edge_sq, bound.sq / rho_sq);
-      continue;
+      return {.bound_sq = bound.sq, .is_at_own_wall = true};
     }
     if (!bound.is_size && view.nearest >= 0 && IsAcross(v, cell.plane(view.nearest).vertex, view.toward)) {
-      continue;
+      return {};
     }
     const NodeName name = view.Name();
     if (std::find(passed_over.nodes.begin(), passed_over.nodes.end(), name) != passed_over.nodes.end()) {
-      continue;
+      return {};
     }
-    const std::tuple<double, NodeName, Point<2>> own = {node.radius_sq, name, node.x};
-    if (bound.sq > rho_sq * edge_limit_sq) {
-      result.next_edge_sq = std::min(result.next_edge_sq, bound.sq / rho_sq);
-    } else if (result.bad_node < 0 || bound.sq < result.bound_sq || (bound.sq == result.bound_sq && best < own)) {
-      result.bound_sq = bound.sq;
-      result.bad_node = static_cast<int>(i);
-      result.bad_plane = view.nearest;
-      result.is_too_large = bound.is_size;
-      best = own;
-    }
-  }
+    return {bound.sq, bound.is_size, false, view.nearest, {node.radius_sq, name, node.x}};
+  };
+  AssessNodes(cell, rho_sq, edge_limit_sq, look, result);
   return result;
 }
 
