@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs the Debian 12 packages that Wellspace needs. The one place with package lists.
 #
-#   deploy/install-deps.sh [GROUP…]        groups: build test interoperability solvers lint tidy fuzz node bench container package monitoring runtime dev; default: build test
+#   deploy/install-deps.sh [GROUP…]        groups: build test interoperability solvers lint tidy fuzz node browser bench container package monitoring runtime dev; default: build test
 #
 # As root, or through sudo. Installs only what is missing; does not touch the network when nothing is.
 set -euo pipefail
@@ -21,6 +21,7 @@ declare -A packages=(
   [tidy]="clang-tidy-14"
   [fuzz]="clang-14 libclang-rt-14-dev"
   [node]="nodejs npm"
+  [browser]="chromium fonts-dejavu-core"
   [bench]="libtet1.5-dev libcgal-dev voro++-dev libbenchmark-dev python3 python3-matplotlib"
   [container]="debootstrap podman buildah"
   [package]="dpkg-dev lintian groff-base debootstrap"
