@@ -13,6 +13,7 @@ void AddCommands(CLI::App& app, int& exit_code) {
   AddInfoCommand(app, exit_code);
   AddCheckCommand(app, exit_code);
   AddRenderCommand(app, exit_code);
+  AddViewCommand(app, exit_code);
   AddServerCommands(app, exit_code);
   AddCompletionCommands(app, exit_code);
 }

@@ -18,6 +18,7 @@ void AddConvertCommand(CLI::App& app, int& exit_code);
 void AddInfoCommand(CLI::App& app, int& exit_code);
 void AddCheckCommand(CLI::App& app, int& exit_code);
 void AddRenderCommand(CLI::App& app, int& exit_code);
+void AddViewCommand(CLI::App& app, int& exit_code);
 void AddServerCommands(CLI::App& app, int& exit_code);      // server info, health
 void AddCompletionCommands(CLI::App& app, int& exit_code);  // completion bash, manual
 

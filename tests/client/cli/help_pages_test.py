@@ -37,8 +37,8 @@ class ManualTest(unittest.TestCase):
     def test_has_every_command_and_option(self):
         page = run("manual").replace("\\-", "-")
         names = list(leaves())
-        commands = ("mesh estimate convert info upload refine watch cancel download cells add check render completion "
-                    "manual")
+        commands = ("mesh estimate convert info upload refine watch cancel download cells add check render view "
+                    "completion manual")
         for name in commands.split():
             self.assertIn((name,), names)
         for name in ("create list show update delete").split():

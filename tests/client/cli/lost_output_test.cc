@@ -52,7 +52,9 @@ class LostOutputTest : public testing::Test {
             {"check", mesh_},
             {"check", mesh_, "--output", "json"},
             {"check", mesh_, "--rho", "0.6"},  // a violation
-            {"render", mesh_, "-o", Path("out.png"), "--width", "300", "--output", "json"}};
+            {"render", mesh_, "-o", Path("out.png"), "--width", "300", "--output", "json"},
+            {"view", mesh_, "-o", "-"},
+            {"view", mesh_, "-o", Path("out.html"), "--output", "json"}};
   }
 
   TemporaryFolder folder_;
@@ -142,6 +144,7 @@ TEST_F(LostOutputTest, TheLimitOfAFilesSizeLeavesNoFile) {
   std::vector<std::vector<std::string>> writing = {
       {"render", Path("grid.npz"), "-o", Path("out.png")},
       {"render", Path("grid.npz"), "-o", Path("out.svg")},
+      {"view", Path("grid.npz"), "-o", Path("out.html")},
       {"check", Path("grid.npz"), "--plot", Path("out.svg"), "--output", "json"}};
   for (const char* name : {"out.vtu", "out.vtkhdf", "out.npz", "out.msh", "out.mesh", "out.node", "out.vtk", "out.xdmf",
                            "out.su2", "out.inp"}) {

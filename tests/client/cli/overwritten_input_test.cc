@@ -104,6 +104,7 @@ TEST_F(OverwrittenInputTest, OfMeshesAndTheirClouds) {
   ASSERT_EQ(RunWellspace({"mesh", table_, "-o", Path("mesh.node")}).exit_code, 0);
   const std::string picture = HardLink("picture.png", Path("mesh.ele"));
   IsRefused({"render", Path("mesh.node"), "-o", picture}, "--out", "MESH");
+  IsRefused({"view", Path("mesh.node"), "-o", picture}, "--out", "MESH");
   IsRefused({"check", Path("mesh.node"), "--plot", picture}, "--plot", "MESH");
   IsRefused({"check", Path("mesh.node"), "--cloud", table_, "--plot", SymbolicLink("plot.svg", "a.csv")}, "--plot",
             "--cloud");
