@@ -1,7 +1,7 @@
-"""Makes `wellspace/_api.binpb`, the descriptors of the API, of the protos.
+"""Makes `wellspace/_api.binpb`, the descriptors of the API, of the protos, and copies `wellspace/viewer.html`.
 
-From the repository they are compiled by protoc, or by grpcio-tools where there is no protoc. A source distribution has
-them compiled, since it is built away from the protos.
+From the repository the protos are compiled by protoc, or by grpcio-tools where there is no protoc. A source
+distribution has both files, since it is built away from the repository.
 """
 
 import pathlib
@@ -15,7 +15,9 @@ from setuptools.command.sdist import sdist
 
 HERE = pathlib.Path(__file__).resolve().parent
 PROTOS = HERE.parent.parent / "proto"
+VIEWER = HERE.parent / "viewer" / "page.html"
 DESCRIPTORS = pathlib.Path("wellspace", "_api.binpb")
+PAGE = pathlib.Path("wellspace", "viewer.html")
 FILES = ("wellspace/v1/*.proto", "google/rpc/*.proto", "grpc/health/v1/*.proto")
 
 
@@ -35,22 +37,35 @@ def compile_protos(target):
     subprocess.run([*compiler, *arguments], check=True)
 
 
-class BuildWithDescriptors(build_py):
-    """Adds the descriptors to what is built."""
+def copy_page(target):
+    """Copies the page of the viewer to `target`; a source distribution has it already."""
+    copied = HERE / "src" / PAGE
+    source = VIEWER if VIEWER.is_file() else copied
+    if not source.is_file():
+        sys.exit(f"setup.py: neither {VIEWER} nor {copied} is there")
+    if source != target:
+        shutil.copyfile(source, target)
+
+
+class BuildWithMadeFiles(build_py):
+    """Adds the descriptors and the page to what is built."""
 
     def run(self):
         super().run()
-        compile_protos(pathlib.Path(self.build_lib).resolve() / DESCRIPTORS)
+        folder = pathlib.Path(self.build_lib).resolve()
+        compile_protos(folder / DESCRIPTORS)
+        copy_page(folder / PAGE)
 
 
-class SdistWithDescriptors(sdist):
-    """Adds the descriptors to the sources."""
+class SdistWithMadeFiles(sdist):
+    """Adds the descriptors and the page to the sources."""
 
     def make_release_tree(self, base_dir, files):
         super().make_release_tree(base_dir, files)
-        target = pathlib.Path(base_dir).resolve() / "src" / DESCRIPTORS
-        target.unlink(missing_ok=True)  # may be a link into the tree
-        compile_protos(target)
+        folder = pathlib.Path(base_dir).resolve() / "src"
+        for file, make in ((DESCRIPTORS, compile_protos), (PAGE, copy_page)):
+            (folder / file).unlink(missing_ok=True)  # may be a link into the tree
+            make(folder / file)
 
 
-setuptools.setup(cmdclass={"build_py": BuildWithDescriptors, "sdist": SdistWithDescriptors})
+setuptools.setup(cmdclass={"build_py": BuildWithMadeFiles, "sdist": SdistWithMadeFiles})

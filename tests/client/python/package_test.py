@@ -32,6 +32,8 @@ class PackageTest(unittest.TestCase):
         # A copy: builds leave files behind.
         shutil.copytree(ROOT / "client" / "python", cls.folder / "tree" / "client" / "python", symlinks=True)
         shutil.copytree(ROOT / "proto", cls.folder / "tree" / "proto")
+        (cls.folder / "tree" / "client" / "viewer").mkdir()
+        shutil.copy(ROOT / "client" / "viewer" / "page.html", cls.folder / "tree" / "client" / "viewer")
         shutil.copy(ROOT / "LICENSE", cls.folder / "tree")
         cls.run_python("-m", "build", "--no-isolation", "--outdir", cls.folder / "dist",
                        cls.folder / "tree" / "client" / "python")
@@ -54,9 +56,10 @@ class PackageTest(unittest.TestCase):
         sources = {path.name for path in folder.iterdir() if path.suffix in (".py", ".typed")}
         with zipfile.ZipFile(self.wheel) as wheel:
             names = {name for name in wheel.namelist() if name.startswith("wellspace/")}
-            self.assertEqual(names, {f"wellspace/{name}" for name in sources | {"_api.binpb"}})
+            self.assertEqual(names, {f"wellspace/{name}" for name in sources | {"_api.binpb", "viewer.html"}})
             (metadata,) = [wheel.read(name).decode() for name in wheel.namelist() if name.endswith("METADATA")]
             descriptors = wheel.read("wellspace/_api.binpb")
+            page = wheel.read("wellspace/viewer.html")
         for line in ("Name: wellspace", "Requires-Dist: grpcio", "Requires-Dist: numpy", "License: Apache-2.0",
                      "Description-Content-Type: text/markdown"):
             self.assertIn(line, metadata)
@@ -65,6 +68,8 @@ class PackageTest(unittest.TestCase):
             names = {name.partition("/")[2] for name in sdist.getnames()}
             prefix = self.sdist.name.removesuffix(".tar.gz")
             self.assertEqual(sdist.extractfile(f"{prefix}/src/wellspace/_api.binpb").read(), descriptors)
+            self.assertEqual(sdist.extractfile(f"{prefix}/src/wellspace/viewer.html").read(), page)
+        self.assertEqual(page, (ROOT / "client" / "viewer" / "page.html").read_bytes())
         self.assertLessEqual({"LICENSE", "README.md", "setup.py", "pyproject.toml", "src/wellspace/py.typed"}, names)
 
     def test_debian_package_says_the_same(self):

@@ -26,6 +26,7 @@ from ._session_info import SessionInfo
 from ._sessions import Session
 from ._sizes import SizeArguments
 from ._version import __version__
+from ._view import Plot
 from .errors import (
     CancelledError,
     ConflictError,
@@ -139,6 +140,7 @@ __all__ = [
     "NotFoundError",
     "Operation",
     "OutOfRangeError",
+    "Plot",
     "Progress",
     "RegionPolygon",
     "RegionSeed",

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import os
 import pathlib
 import tempfile
 import zipfile
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -36,10 +38,18 @@ def save(mesh: Mesh, path: str | os.PathLike[str], options: dict[str, Any]) -> N
         return
     if options:
         raise InvalidArgumentError(f".npz takes no options; got {', '.join(options)}", field=next(iter(options)))
+    with replacing(target) as file:
+        np.savez(file, **_members(mesh))
+
+
+@contextlib.contextmanager
+def replacing(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
+    """A file that gets its name once all is written, and is not there otherwise."""
+    target = pathlib.Path(path)
     handle, part = tempfile.mkstemp(prefix=target.name, suffix=".part", dir=target.parent)
     try:
         with os.fdopen(handle, "wb") as file:
-            np.savez(file, **_members(mesh))
+            yield file
         umask = os.umask(0)
         os.umask(umask)
         os.chmod(part, 0o666 & ~umask)

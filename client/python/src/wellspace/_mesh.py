@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 import os
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from . import _dual, _files
+from . import _dual, _files, _view
 from ._dual import DualCells
 from ._receiver import MeshReceiver
+from ._view import Plot
 from .errors import InvalidArgumentError
 from .statistics import Statistics, statistics_of
 
@@ -147,6 +149,34 @@ class Mesh:
         For 2-D and 3-D; in 2-D, z is 0.
         """
         return _files.to_pyvista(self)
+
+    def plot(
+        self, *, name: str = "mesh", up: str = "z", data: Mapping[str, Any] | None = None, height: int = 600
+    ) -> Plot:
+        """A page that shows the mesh, below the cell of a notebook or, by `Plot.save`, in a file. For 2-D and 3-D.
+
+        Parameters
+        ----------
+        name : str
+            What the page calls the mesh.
+        up : str
+            The axis that points upwards at first: ``"x"``, ``"y"`` or ``"z"``.
+        data : dict of str to (n,) array
+            Numbers of the vertices, by their names: the page can colour by them. NaN stands for none.
+        height : int
+            In the notebook, in pixels.
+
+        Raises
+        ------
+        InvalidArgumentError
+            The mesh is of another dimension or has no simplices; `up` or `data` is not valid.
+        LimitError
+            An array of the mesh is larger than a browser can read: above 16 million tetrahedra.
+        """
+        return _view.plot(self, name, up, data, height)
+
+    def _repr_html_(self) -> str:
+        return _view.table(self)
 
 
 def signed(values: npt.NDArray[Any], limit: int) -> npt.NDArray[Any]:
