@@ -14,6 +14,7 @@
 #include "core/base/status_macros.h"
 #include "core/features/place.h"
 #include "core/features/polygon_seeds.h"
+#include "core/features/union_find.h"
 #include "core/geometry/exact_measure.h"
 
 namespace wellspace::core {
@@ -23,28 +24,6 @@ constexpr uint32_t kNone = GraphSegment::kNoPolygon;
 
 // Half-edges that are sorted without a look at the context.
 constexpr std::ptrdiff_t kFewAround = 1024;
-
-// Sets of numbers that are joined.
-class UnionFind {
- public:
-  explicit UnionFind(size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0); }
-
-  uint32_t Find(uint32_t i) {
-    while (parent_[i] != i) {
-      i = parent_[i] = parent_[parent_[i]];
-    }
-    return i;
-  }
-  // The lower number stands for both.
-  void Join(uint32_t i, uint32_t j) {
-    i = Find(i);
-    j = Find(j);
-    parent_[std::max(i, j)] = std::min(i, j);
-  }
-
- private:
-  std::vector<uint32_t> parent_;
-};
 
 // Finds the faces, step after step.
 class FaceFinder {
