@@ -8,8 +8,10 @@
 namespace wellspace::formats {
 
 void LineIndex::Add(uint64_t line) {
-  if (runs_.empty() || line != runs_.back().first_line + (size_ - runs_.back().first_point)) {
-    runs_.push_back({size_, line});
+  if (!runs_.empty() && size_ - runs_.back().first_point == 1) {
+    runs_.back().step = line - runs_.back().first_line;
+  } else if (runs_.empty() || line != runs_.back().LineOf(size_)) {
+    runs_.push_back({.first_point = size_, .first_line = line});
   }
   ++size_;
 }
@@ -17,8 +19,7 @@ void LineIndex::Add(uint64_t line) {
 uint64_t LineIndex::LineOf(uint64_t point) const {
   const auto after = std::upper_bound(runs_.begin(), runs_.end(), point,
                                       [](uint64_t wanted, const Run& run) { return wanted < run.first_point; });
-  const Run& run = *std::prev(after);
-  return run.first_line + (point - run.first_point);
+  return std::prev(after)->LineOf(point);
 }
 
 std::string PointCloud::Origin(uint64_t point) const {

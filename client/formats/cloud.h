@@ -13,8 +13,8 @@ namespace wellspace::formats {
 inline constexpr int kMinDimension = 2;
 inline constexpr int kMaxDimension = 6;
 
-// The line of a file that each point came from. Points on consecutive lines cost nothing: only the first point after a
-// gap (a comment, a blank line) is stored.
+// The line of a file that each point came from. Points on lines that follow each other at equal steps cost nothing: only
+// the first point after a gap (a comment, a blank line) is stored.
 //
 // Thread safety: thread-compatible.
 class LineIndex {
@@ -27,8 +27,11 @@ class LineIndex {
 
  private:
   struct Run {
-    uint64_t first_point;
-    uint64_t first_line;
+    uint64_t first_point = 0;
+    uint64_t first_line = 0;
+    uint64_t step = 0;  // from the line of one point to that of the next
+
+    uint64_t LineOf(uint64_t point) const { return first_line + (point - first_point) * step; }
   };
   std::vector<Run> runs_;
   uint64_t size_ = 0;

@@ -38,6 +38,12 @@ class ObjLines {
   absl::Status status_;
 };
 
+// Reads the vertex that a line or a face has, of the `count` above: "7", "-1" from the last one back, or "7/3/2" with
+// those of textures and normals, which are not looked at. `what` has the vertex, for messages: "line".
+//
+// Errors:     INVALID_ARGUMENT, a message without a location.
+absl::Status TakeObjVertex(std::string_view field, uint64_t count, std::string_view what, uint32_t& vertex);
+
 }  // namespace wellspace::formats
 
 #endif  // WELLSPACE_CLIENT_FORMATS_OBJ_LINES_H_

@@ -49,8 +49,6 @@ class ObjLineReader {
   absl::Status Error(std::string_view message) const { return LineError(domain_.name, line_, message); }
   absl::Status ReadVertex(FieldSplitter& fields);
   absl::Status ReadLine(FieldSplitter& fields);
-  // "7", "-1", or "7/3" with a texture coordinate.
-  absl::Status ReadIndex(std::string_view field, uint32_t& vertex) const;
 
   PlanarDomain& domain_;
   uint64_t line_ = 0;  // the one that is read
@@ -92,27 +90,14 @@ absl::Status ObjLineReader::ReadVertex(FieldSplitter& fields) {
   return absl::OkStatus();
 }
 
-absl::Status ObjLineReader::ReadIndex(std::string_view field, uint32_t& vertex) const {
-  const std::string_view text = field.substr(0, field.find('/'));
-  const bool is_from_end = !text.empty() && text[0] == '-';
-  const uint64_t count = domain_.point_count();
-  uint64_t index = 0;
-  if (!ParseUnsigned(text.substr(is_from_end ? 1 : 0), kMaxCount, index) || index < 1 || index > count) {
-    return Error(
-        count == 0 ? absl::StrCat("expected vertices before the line, got none; and the line has vertex ", Quote(field))
-                   : absl::StrCat("expected a vertex from 1 to ", count, " or from -", count,
-                                  " to -1, of those above, got ", Quote(field)));
-  }
-  vertex = static_cast<uint32_t>(is_from_end ? count - index : index - 1);
-  return absl::OkStatus();
-}
-
 absl::Status ObjLineReader::ReadLine(FieldSplitter& fields) {
   uint32_t last = 0;
   uint64_t count = 0;
   for (std::string_view field; fields.Next(field); ++count) {
     uint32_t vertex = 0;
-    WELLSPACE_RETURN_IF_ERROR(ReadIndex(field, vertex));
+    if (absl::Status status = TakeObjVertex(field, domain_.point_count(), "line", vertex); !status.ok()) {
+      return Error(std::string(status.message()));
+    }
     if (count > 0) {
       domain_.segments.insert(domain_.segments.end(), {last, vertex});
       domain_.segment_lines.Add(line_);

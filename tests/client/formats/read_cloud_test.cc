@@ -214,7 +214,7 @@ TEST(AppendNumberTest, ReadsBackToTheBit) {
 
 TEST(LineIndexTest, FindsLinesAcrossGaps) {
   LineIndex index;
-  const std::vector<uint64_t> lines = {1, 2, 3, 7, 8, 20, 21, 22, 22, 23};
+  const std::vector<uint64_t> lines = {1, 2, 3, 7, 8, 20, 21, 22, 22, 23, 30, 37, 44, 45, 45, 45, 45, 47};
   for (const uint64_t line : lines) {
     index.Add(line);
   }

@@ -244,12 +244,14 @@ TEST_F(ReadVerticesTest, Off) {
   EXPECT_THAT(ReadGood("a.off", "4OFF\n1 0 0\n1 2 3 4\n").points, ElementsAre(1, 2, 3, 4));
   EXPECT_THAT(ReadGood("a.off", "nOFF\n5\n1 0 0\n1 2 3 4 5\n").points, ElementsAre(1, 2, 3, 4, 5));
   EXPECT_THAT(ReadGood("a.off", "nOFF 2\n1 0 0\n1 2\n").points, ElementsAre(1, 2));
+  EXPECT_THAT(ReadGood("a.off", "off\n1 0 0\n1 2 3\n").points, ElementsAre(1, 2, 3));
+  EXPECT_THAT(ReadGood("a.off", "coff\n1 0 0\n1 2 3 255 0 0 255\n").points, ElementsAre(1, 2, 3));
   EXPECT_THAT(ReadGood("a.off", "OFF\n0 0 0\n").points, IsEmpty());
   EXPECT_THAT(ReadGood("a.off", "OFF\n1 0 0\n1 2 3\n").Origin(0), EndsWith("a.off:3"));
 }
 
 TEST_F(ReadVerticesTest, OffErrors) {
-  for (const char* content : {"", "off\n1 0 0\n", "8 6 12\n", "4nOFF\n", "ply\n"}) {
+  for (const char* content : {"", "noff\n1 0 0\n", "8 6 12\n", "4nOFF\n", "ply\n"}) {
     EXPECT_EQ(ReadBad("a.off", content),
               "a.off:1: expected OFF, STOFF, COFF, NOFF, CNOFF, 4OFF or nOFF at the start of the file");
   }
