@@ -5,25 +5,17 @@
 #include <string>
 #include <utility>
 
-#include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 #include "client/formats/coordinate.h"
 #include "client/formats/domain/domain_readers.h"
 #include "client/formats/io/input_file.h"
 #include "client/formats/io/number.h"
-#include "client/formats/io/open_input.h"
-#include "client/formats/registry.h"
+#include "client/formats/tetgen/poly_points.h"
 #include "client/formats/tetgen/tetgen_lines.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
-
-// The file of points at `plain`, or compressed beside it.
-absl::StatusOr<InputFile> OpenNode(const std::string& plain) {
-  absl::StatusOr<InputFile> file = OpenInflated(plain);
-  return absl::IsNotFound(file.status()) ? OpenInflated(plain + std::string(kGzipExtension)) : std::move(file);
-}
 
 class PolyReader {
  public:
@@ -45,14 +37,11 @@ class PolyReader {
 
  private:
   absl::Status ReadPoints();
-  absl::Status ReadPointsBeside();
   absl::Status ReadSegments(std::string_view line);
   absl::Status ReadEnd(FieldSplitter& fields, uint32_t& end);
   absl::Status ReadHoles(std::string_view line);
   absl::Status ReadRegions(std::string_view line);
   absl::Status ReadSeed(FieldSplitter& fields, PlanarDomain::Seed& seed);
-  absl::Status TakePoints(LineReader& reader, const NodeHeader& header);
-  absl::Status CheckDimension(const LineReader& reader, const NodeHeader& header) const;
   // An error where the fields of the line go on.
   absl::Status ExpectNoMore(FieldSplitter& fields, std::string_view expected);
 
@@ -70,18 +59,11 @@ absl::Status PolyReader::ExpectNoMore(FieldSplitter& fields, std::string_view ex
              : absl::OkStatus();
 }
 
-absl::Status PolyReader::CheckDimension(const LineReader& reader, const NodeHeader& header) const {
-  return header.dimension == 2
-             ? absl::OkStatus()
-             : reader.Error(absl::StrCat("expected dimension 2, since the domain is one in the plane, "
-                                         "got ",
-                                         header.dimension));
-}
-
-absl::Status PolyReader::TakePoints(LineReader& reader, const NodeHeader& header) {
+absl::Status PolyReader::ReadPoints() {
   PointCloud cloud;
   NodeExtras extras = {.takes_markers = true, .may_skip = false};
-  WELLSPACE_RETURN_IF_ERROR(ReadNodePoints(reader, header, /*skip_invalid=*/false, cloud, extras));
+  WELLSPACE_RETURN_IF_ERROR(ReadPolyPoints(reader_, path_, 2, "since the domain is one in the plane", cloud, extras,
+                                           domain_.points_name));
   domain_.points = std::move(cloud.points);
   domain_.point_lines = std::move(cloud.lines);
   domain_.point_markers = std::move(extras.markers);
@@ -89,55 +71,12 @@ absl::Status PolyReader::TakePoints(LineReader& reader, const NodeHeader& header
   return absl::OkStatus();
 }
 
-absl::Status PolyReader::ReadPoints() {
-  NodeHeader header;
-  WELLSPACE_RETURN_IF_ERROR(ReadNodeHeader(reader_, header));
-  WELLSPACE_RETURN_IF_ERROR(CheckDimension(reader_, header));
-  return header.count > 0 ? TakePoints(reader_, header) : ReadPointsBeside();
-}
-
-// Reads the points of the .node file beside the .poly, which has none itself.
-absl::Status PolyReader::ReadPointsBeside() {
-  if (path_ == kStandardStream) {
-    return reader_.Error(
-        "0 points stand for those of the .node file beside this one, and standard input has none; "
-        "expected the points here");
-  }
-  const std::string poly = WithoutGzip(path_);
-  const std::string plain = poly.substr(0, poly.size() - ExtensionOf(poly).size()) + ".node";
-  absl::StatusOr<InputFile> file = OpenNode(plain);
-  if (absl::IsNotFound(file.status())) {
-    return reader_.Error(absl::StrCat("0 points stand for those of the file ", plain,
-                                      ", and there is none; expected it, also with .gz, or the points here"));
-  }
-  if (!file.ok()) {
-    return file.status();
-  }
-  LineReader reader(*std::move(file));
-  NodeHeader header;
-  WELLSPACE_RETURN_IF_ERROR(ReadNodeHeader(reader, header));
-  WELLSPACE_RETURN_IF_ERROR(CheckDimension(reader, header));
-  WELLSPACE_RETURN_IF_ERROR(TakePoints(reader, header));
-  domain_.points_name = reader.name();
-  WELLSPACE_RETURN_IF_ERROR(ExpectEnd(reader, header.count, "points"));
-  return reader.Finish();
-}
-
 absl::Status PolyReader::ReadEnd(FieldSplitter& fields, uint32_t& end) {
   std::string_view field;
   if (!fields.Next(field)) {
     return reader_.Error("expected an index and two points, got fewer numbers");
   }
-  uint64_t point = 0;
-  const uint64_t count = domain_.point_count();
-  if (!ParseUnsigned(field, kMaxCount, point) || point < index_base_ || point - index_base_ >= count) {
-    return reader_.Error(
-        count == 0 ? absl::StrCat("expected no segment, since there are no points, got one to point ", Quote(field))
-                   : absl::StrCat("expected a point from ", index_base_, " to ", count - 1 + index_base_, ", got ",
-                                  Quote(field)));
-  }
-  end = static_cast<uint32_t>(point - index_base_);
-  return absl::OkStatus();
+  return ReadPolyPoint(reader_, field, index_base_, domain_.point_count(), "segment", end);
 }
 
 absl::Status PolyReader::ReadSegments(std::string_view line) {
