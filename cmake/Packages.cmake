@@ -70,4 +70,4 @@ include(CPack)
 # What is in the packages, and nothing else.
 add_custom_target(wellspace_packaged)
 add_dependencies(wellspace_packaged wellspace wellspaced wellspace_help_pages wellspace_python wellspace_core
-                 wellspace_client_files wellspace_formats_domain)
+                 wellspace_client_files wellspace_formats_domain wellspace_formats_surface)

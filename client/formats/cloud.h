@@ -13,8 +13,8 @@ namespace wellspace::formats {
 inline constexpr int kMinDimension = 2;
 inline constexpr int kMaxDimension = 6;
 
-// The line of a file that each point came from. Points on lines that follow each other at equal steps cost nothing: only
-// the first point after a gap (a comment, a blank line) is stored.
+// The line of a file that each point came from. Points on lines that follow each other at equal steps cost nothing:
+// only the first point after a gap (a comment, a blank line) is stored.
 //
 // Thread safety: thread-compatible.
 class LineIndex {

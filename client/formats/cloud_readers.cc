@@ -36,6 +36,11 @@ absl::Status TakeCoordinate(std::string_view text, bool skip_invalid, double& va
   return CoordinateError(text);
 }
 
+absl::Status TakeCoordinate(std::string_view text, InvalidValue rule, double& value, bool& is_invalid) {
+  return rule == InvalidValue::kRefuse ? TakeFinite(text, value)
+                                       : TakeCoordinate(text, rule == InvalidValue::kSkip, value, is_invalid);
+}
+
 void AddPoint(std::span<const double> point, bool is_invalid, uint64_t line, PointCloud& cloud) {
   if (is_invalid) {
     ++cloud.skipped;

@@ -56,6 +56,16 @@ absl::Status ReadNode(LineReader& reader, const CloudOptions& options, PointClou
 // Errors:     a message without a location.
 absl::Status TakeCoordinate(std::string_view text, bool skip_invalid, double& value, bool& is_invalid);
 
+// What becomes of a value that is missing or not finite.
+enum class InvalidValue : uint8_t {
+  kRefuse,
+  kTell,  // an error whose message says that it could be skipped
+  kSkip,
+};
+
+// The same for a reader of more than clouds.
+absl::Status TakeCoordinate(std::string_view text, InvalidValue rule, double& value, bool& is_invalid);
+
 // Adds `point`, read from the last line of `reader`, to the cloud; or counts it as skipped.
 void AddPoint(std::span<const double> point, bool is_invalid, uint64_t line, PointCloud& cloud);
 

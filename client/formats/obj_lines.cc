@@ -75,11 +75,11 @@ absl::Status TakeObjVertex(std::string_view field, uint64_t count, std::string_v
   const bool is_from_end = !text.empty() && text[0] == '-';
   uint64_t index = 0;
   if (!ParseUnsigned(text.substr(is_from_end ? 1 : 0), kMaxCount, index) || index < 1 || index > count) {
-    return absl::InvalidArgumentError(
-        count == 0 ? absl::StrCat("expected vertices before the ", std::string(what), ", got none; and the ",
-                                  std::string(what), " has vertex ", Quote(field))
-                   : absl::StrCat("expected a vertex from 1 to ", count, " or from -", count,
-                                  " to -1, of those above, got ", Quote(field)));
+    return absl::InvalidArgumentError(count == 0 ? absl::StrCat("expected vertices before the ", std::string(what),
+                                                                ", got none; and the ", std::string(what),
+                                                                " has vertex ", Quote(field))
+                                                 : absl::StrCat("expected a vertex from 1 to ", count, " or from -",
+                                                                count, " to -1, of those above, got ", Quote(field)));
   }
   vertex = static_cast<uint32_t>(is_from_end ? count - index : index - 1);
   return absl::OkStatus();

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "client/formats/cloud_readers.h"
 #include "client/formats/io/number.h"
 #include "core/base/status_macros.h"
 
@@ -73,7 +72,7 @@ absl::Status ReadOffHeader(LineReader& reader, OffHeader& header) {
   return absl::OkStatus();
 }
 
-absl::Status ReadOffVertex(LineReader& reader, const OffHeader& header, uint64_t vertex, bool skip_invalid,
+absl::Status ReadOffVertex(LineReader& reader, const OffHeader& header, uint64_t vertex, InvalidValue invalid,
                            PointCloud& cloud) {
   std::string_view line;
   if (!reader.NextContent(line)) {
@@ -87,7 +86,7 @@ absl::Status ReadOffVertex(LineReader& reader, const OffHeader& header, uint64_t
     if (!fields.Next(field)) {
       return reader.Error(absl::StrCat("expected ", header.coordinates, " coordinates, got ", axis));
     }
-    if (absl::Status status = TakeCoordinate(field, skip_invalid, point[axis], is_invalid); !status.ok()) {
+    if (absl::Status status = TakeCoordinate(field, invalid, point[axis], is_invalid); !status.ok()) {
       return reader.Error(absl::StrCat("coordinate ", axis + 1, ": ", status.message()));
     }
   }

@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "absl/status/status.h"
-#include "client/formats/cloud.h"
+#include "client/formats/cloud_readers.h"
 #include "client/formats/io/line_reader.h"
 
 namespace wellspace::formats {
@@ -22,7 +22,7 @@ struct OffHeader {
 absl::Status ReadOffHeader(LineReader& reader, OffHeader& header);
 
 // Reads vertex number `vertex` of those that the header announces, into `cloud`.
-absl::Status ReadOffVertex(LineReader& reader, const OffHeader& header, uint64_t vertex, bool skip_invalid,
+absl::Status ReadOffVertex(LineReader& reader, const OffHeader& header, uint64_t vertex, InvalidValue invalid,
                            PointCloud& cloud);
 
 }  // namespace wellspace::formats

@@ -109,8 +109,7 @@ absl::Status PlyRows::ReadHeader() {
       continue;
     }
     if (fields[0] == "end_header") {
-      return has_format ? absl::OkStatus()
-                        : reader_.Error("expected a line \"format\" before the end of the header");
+      return has_format ? absl::OkStatus() : reader_.Error("expected a line \"format\" before the end of the header");
     }
     absl::Status status;
     if (fields[0] == "format") {
@@ -179,10 +178,10 @@ absl::Status PlyRows::ReadProperty(const std::vector<std::string_view>& fields) 
   }
   for (size_t i = is_list ? 2 : 1; i <= type_at; ++i) {
     if (!ScalarOf(fields[i])) {
-      return reader_.Error(absl::StrCat(
-          "expected a type (char, uchar, short, ushort, int, uint, float, double, or int8, uint8, int16, "
-          "uint16, int32, uint32, float32, float64), got ",
-          Quote(fields[i])));
+      return reader_.Error(
+          absl::StrCat("expected a type (char, uchar, short, ushort, int, uint, float, double, or int8, uint8, int16, "
+                       "uint16, int32, uint32, float32, float64), got ",
+                       Quote(fields[i])));
     }
   }
   PlyProperty property{.list_count = std::nullopt,

@@ -22,8 +22,8 @@
 //         are all other lines. A line that ends in a backslash goes on in the next one.
 //   off   Geomview's in ascii: "OFF", the numbers of vertices, faces and edges, then a line for each vertex. What is
 //         before OFF announces numbers after the coordinates, which are skipped: ST texture, C colour, N normal. 4OFF
-//         has four coordinates, all taken as they are; nOFF says how many before the counts. Lower case will do, but for
-//         N and n.
+//         has four coordinates, all taken as they are; nOFF says how many before the counts. Lower case will do, but
+//         for N and n.
 //   stl   In ascii, in any case, or binary: the corners of the triangles, each once; -0 is 0. A number of triangles of
 //         0 stands for all that follow.
 //   pcd   The Point Cloud Library's: fields x, y and, if it is there, z; data in ascii, binary or binary_compressed.

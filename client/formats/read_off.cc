@@ -12,8 +12,9 @@ absl::Status ReadOff(LineReader& reader, const CloudOptions& options, PointCloud
     return reader.Error(DimensionError(options.dimension, header.coordinates));
   }
   cloud.dimension = static_cast<int>(header.coordinates);
+  const InvalidValue invalid = options.skip_invalid ? InvalidValue::kSkip : InvalidValue::kTell;
   for (uint64_t vertex = 0; vertex < header.vertices; ++vertex) {
-    WELLSPACE_RETURN_IF_ERROR(ReadOffVertex(reader, header, vertex, options.skip_invalid, cloud));
+    WELLSPACE_RETURN_IF_ERROR(ReadOffVertex(reader, header, vertex, invalid, cloud));
   }
   NoteFaces(header.faces, cloud);
   return absl::OkStatus();

@@ -46,7 +46,7 @@ absl::Status ReadStl(InputFile& file, const CloudOptions& options, PointCloud& c
     return absl::InvalidArgumentError(absl::StrCat(cloud.name, ": ", rows.status().message()));
   }
   LineReader reader(std::move(file));
-  StlParts parts(reader, is_text, options.skip_invalid ? StlParts::Invalid::kSkip : StlParts::Invalid::kTell);
+  StlParts parts(reader, is_text, options.skip_invalid ? InvalidValue::kSkip : InvalidValue::kTell);
   WELLSPACE_RETURN_IF_ERROR(AddCorners(parts, *rows, cloud));
   return reader.Finish();
 }

@@ -4,16 +4,14 @@
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
-#include "client/formats/cloud_readers.h"
-#include "client/formats/coordinate.h"
 #include "client/formats/vtk/vtk_array.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
 
-constexpr size_t kHeaderBytes = 80;
-constexpr size_t kCornersAt = 12;
+constexpr size_t kStlHeaderBytes = 80;
+constexpr size_t kStlCornersAt = 12;
 
 bool Is(std::string_view word, const char* keyword) {
   return absl::EqualsIgnoreCase(absl::string_view(word.data(), word.size()), keyword);
@@ -24,13 +22,13 @@ bool Is(std::string_view word, const char* keyword) {
 absl::StatusOr<bool> IsStlText(InputFile& file) {
   // A file in binary may start with "solid", too; but then bytes follow that no text has, at the latest in the number
   // of triangles.
-  WELLSPACE_ASSIGN_OR_RETURN(const std::string_view start, file.Peek(kHeaderBytes + sizeof(uint32_t)));
+  WELLSPACE_ASSIGN_OR_RETURN(const std::string_view start, file.Peek(kStlHeaderBytes + sizeof(uint32_t)));
   bool is_text = true;
   for (const char c : start) {
     is_text = is_text && c != '\0' && c != '\x7f';
   }
   const size_t word = start.find_first_not_of(" \t\r\n");
-  return is_text && (start.size() < kHeaderBytes + sizeof(uint32_t) ||
+  return is_text && (start.size() < kStlHeaderBytes + sizeof(uint32_t) ||
                      (word != std::string_view::npos && Is(start.substr(word, 5), "solid")));
 }
 
@@ -87,10 +85,7 @@ absl::Status StlParts::ReadVertex(FieldSplitter& fields) {
       return reader_.Error("expected three coordinates after \"vertex\"");
     }
     bool is_invalid = false;
-    const absl::Status status = invalid_ == Invalid::kRefuse
-                                    ? TakeFinite(field, x)
-                                    : TakeCoordinate(field, invalid_ == Invalid::kSkip, x, is_invalid);
-    if (!status.ok()) {
+    if (const absl::Status status = TakeCoordinate(field, invalid_, x, is_invalid); !status.ok()) {
       return reader_.Error(std::string(status.message()));
     }
     x = is_invalid ? std::numeric_limits<double>::quiet_NaN() : x + 0.0;  // -0 becomes 0
@@ -102,11 +97,11 @@ absl::Status StlParts::ReadVertex(FieldSplitter& fields) {
 
 absl::StatusOr<StlParts::Part> StlParts::NextOfBinary() {
   if (!has_begun_) {
-    char header[kHeaderBytes + sizeof(uint32_t)];
+    char header[kStlHeaderBytes + sizeof(uint32_t)];
     if (reader_.Take(header, sizeof(header)) != sizeof(header)) {
       return EndError("expected 80 bytes of a header and a number of triangles");
     }
-    count_ = LoadWord<uint32_t>({header + kHeaderBytes, sizeof(uint32_t)}, 0, /*big_endian=*/false);
+    count_ = LoadWord<uint32_t>({header + kStlHeaderBytes, sizeof(uint32_t)}, 0, /*big_endian=*/false);
     has_begun_ = true;
   }
   switch (last_) {
@@ -126,7 +121,7 @@ absl::StatusOr<StlParts::Part> StlParts::NextOfBinary() {
   }
   if (last_ == Part::kVertex) {
     for (size_t axis = 0; axis < point_.size(); ++axis) {
-      const float x = LoadWord<float>({triangle_.data() + kCornersAt, triangle_.size() - kCornersAt},
+      const float x = LoadWord<float>({triangle_.data() + kStlCornersAt, triangle_.size() - kStlCornersAt},
                                       3 * corner_ + axis, /*big_endian=*/false);
       point_[axis] = x + 0.0;  // -0 becomes 0
     }

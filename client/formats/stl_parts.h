@@ -11,6 +11,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "client/formats/cloud_readers.h"
 #include "client/formats/io/input_file.h"
 #include "client/formats/io/line_reader.h"
 #include "client/formats/io/number.h"
@@ -40,15 +41,10 @@ class StlParts {
   // has facets of three vertices, and no solids.
   enum class Part : uint8_t { kEnd, kSolid, kFacet, kVertex, kEndFacet, kEndSolid };
 
-  // How coordinates are read that are missing or not finite.
-  enum class Invalid : uint8_t {
-    kRefuse,  // in binary they come as they are
-    kSkip,    // as NaN, in binary as they are
-    kTell,    // as kRefuse, and the message says that they can be skipped
-  };
-
+  // Coordinates that are skipped come as NaN; in binary all come as they are.
+  //
   // REQUIRES:   `reader` is at the start of the file, and outlives this.
-  StlParts(LineReader& reader, bool is_text, Invalid invalid)
+  StlParts(LineReader& reader, bool is_text, InvalidValue invalid)
       : reader_(reader), is_text_(is_text), invalid_(invalid) {}
 
   // The next part; kEnd at the end of the file.
@@ -82,7 +78,7 @@ class StlParts {
 
   LineReader& reader_;
   const bool is_text_;
-  const Invalid invalid_;
+  const InvalidValue invalid_;
   StlPoint point_{};
   std::string solid_;
   bool has_begun_ = false;

@@ -139,7 +139,7 @@ class Consumers(unittest.TestCase):
                        "if(NOT TARGET wellspace::core OR TARGET wellspace::client)\nmessage(FATAL_ERROR no)\nendif()\n")
 
     def test_all_without_components(self):
-        targets = "core client formats formats_domain client_files"
+        targets = "core client formats formats_domain formats_surface client_files"
         self.configure(f"find_package(wellspace REQUIRED)\nforeach(name {targets})\nif(NOT TARGET wellspace::${{name}})\n"
                        "message(FATAL_ERROR ${name})\nendif()\nendforeach()\n")
 

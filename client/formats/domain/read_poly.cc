@@ -62,8 +62,8 @@ absl::Status PolyReader::ExpectNoMore(FieldSplitter& fields, std::string_view ex
 absl::Status PolyReader::ReadPoints() {
   PointCloud cloud;
   NodeExtras extras = {.takes_markers = true, .may_skip = false};
-  WELLSPACE_RETURN_IF_ERROR(ReadPolyPoints(reader_, path_, 2, "since the domain is one in the plane", cloud, extras,
-                                           domain_.points_name));
+  WELLSPACE_RETURN_IF_ERROR(
+      ReadPolyPoints(reader_, path_, 2, "since the domain is one in the plane", cloud, extras, domain_.points_name));
   domain_.points = std::move(cloud.points);
   domain_.point_lines = std::move(cloud.lines);
   domain_.point_markers = std::move(extras.markers);

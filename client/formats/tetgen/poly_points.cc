@@ -21,10 +21,9 @@ absl::StatusOr<InputFile> OpenNode(const std::string& plain) {
 
 absl::Status ReadHeaderOf(LineReader& reader, uint64_t dimension, std::string_view reason, NodeHeader& header) {
   WELLSPACE_RETURN_IF_ERROR(ReadNodeHeader(reader, header));
-  return header.dimension == dimension
-             ? absl::OkStatus()
-             : reader.Error(absl::StrCat("expected dimension ", dimension, ", ", std::string(reason), ", got ",
-                                         header.dimension));
+  return header.dimension == dimension ? absl::OkStatus()
+                                       : reader.Error(absl::StrCat("expected dimension ", dimension, ", ",
+                                                                   std::string(reason), ", got ", header.dimension));
 }
 
 }  // namespace
@@ -65,8 +64,8 @@ absl::Status ReadPolyPoint(LineReader& reader, std::string_view field, uint64_t 
   if (!ParseUnsigned(field, kMaxCount, index) || index < index_base || index - index_base >= count) {
     return reader.Error(count == 0 ? absl::StrCat("expected no ", std::string(what),
                                                   ", since there are no points, got one to point ", Quote(field))
-                                   : absl::StrCat("expected a point from ", index_base, " to ",
-                                                  count - 1 + index_base, ", got ", Quote(field)));
+                                   : absl::StrCat("expected a point from ", index_base, " to ", count - 1 + index_base,
+                                                  ", got ", Quote(field)));
   }
   point = static_cast<uint32_t>(index - index_base);
   return absl::OkStatus();

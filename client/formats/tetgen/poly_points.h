@@ -20,8 +20,8 @@ namespace wellspace::formats {
 absl::Status ReadPolyPoints(LineReader& reader, const std::string& path, uint64_t dimension, std::string_view reason,
                             PointCloud& cloud, NodeExtras& extras, std::string& points_name);
 
-// Reads the point of which a row has the index; those of `count` points start at `index_base`. `what` has the point, for
-// messages.
+// Reads the point of which a row has the index; those of `count` points start at `index_base`. `what` has the point,
+// for messages.
 //
 // Errors:     INVALID_ARGUMENT at the line.
 absl::Status ReadPolyPoint(LineReader& reader, std::string_view field, uint64_t index_base, uint64_t count,
