@@ -5,6 +5,7 @@
 #include "core/base/simd/lanes.h"
 #include "core/geometry/exact_measure.h"
 #include "core/geometry/point.h"
+#include "core/geometry/vector_product.h"
 
 namespace wellspace::core {
 
@@ -15,10 +16,6 @@ struct TetrahedronMeasure {
   double edge_sq = 0;      // the shortest
   Point<3> centre{};       // of the circumsphere
 };
-
-inline Point<3> Cross(const Point<3>& a, const Point<3>& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
 
 // Measures a tetrahedron in doubles.
 //
