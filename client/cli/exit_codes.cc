@@ -10,8 +10,8 @@ namespace wellspace::cli {
 
 const char kExitCodesHelp[] =
     "Exit codes:\n"
-    "  0    done; `check`: the mesh is valid\n"
-    "  1    `check` found a violation, or the work failed\n"
+    "  0    done; `check`: the mesh is valid; `info`: the surface has no faults\n"
+    "  1    `check` found a violation, `info` faults of a surface, or the work failed\n"
     "  2    wrong usage, or a file or a session that is not there or not valid\n"
     "  3    the server cannot be reached, or stopped\n"
     "  4    a limit of vertices, memory or disk was reached, or output could not be written\n"

@@ -7,11 +7,11 @@
 namespace wellspace::cli {
 
 inline constexpr int kExitOk = 0;
-inline constexpr int kExitFailed = 1;           // `check` found a violation, or the work failed for no reason below
-inline constexpr int kExitBadInput = 2;         // wrong usage, or a file that cannot be read or is not valid
-inline constexpr int kExitUnavailable = 3;      // the server cannot be reached or stopped
-inline constexpr int kExitExhausted = 4;        // a limit of vertices, memory or disk was reached; output not written
-inline constexpr int kExitTimeout = 5;          // --timeout passed
+inline constexpr int kExitFailed = 1;       // `check` or `info` found faults, or the work failed for no reason below
+inline constexpr int kExitBadInput = 2;     // wrong usage, or a file that cannot be read or is not valid
+inline constexpr int kExitUnavailable = 3;  // the server cannot be reached or stopped
+inline constexpr int kExitExhausted = 4;    // a limit of vertices, memory or disk was reached; output not written
+inline constexpr int kExitTimeout = 5;      // --timeout passed
 inline constexpr int kExitUnauthenticated = 6;  // the server does not take the credentials, or its own are not trusted
 inline constexpr int kExitConflict = 7;  // the session is in another state, or at another revision, than is needed
 inline constexpr int kExitSignal = 128;  // plus the number of the signal: 130 for Ctrl-C

@@ -13,13 +13,17 @@
 #include "client/cli/cloud_options.h"
 #include "client/cli/commands/commands.h"
 #include "client/cli/exit_codes.h"
+#include "client/cli/helpful_threads.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/json.h"
 #include "client/cli/meshing_options.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/remote_command.h"
+#include "client/cli/surface_info.h"
+#include "client/cli/surface_options.h"
 #include "client/formats/mesh_or_cloud.h"
 #include "core/base/status_macros.h"
+#include "core/surface_report.h"
 #include "core/validate/validate.h"
 
 namespace wellspace::cli {
@@ -28,15 +32,19 @@ namespace {
 constexpr char kInfoExamples[] =
     "Examples:\n"
     "  wellspace info land.msh\n"
-    "  wellspace info scan.las --json\n";
+    "  wellspace info scan.las --json\n"
+    "  wellspace info part.stl\n"
+    "  wellspace info part.obj --triangles\n";
 
 struct InfoCommand {
   std::string path;
   formats::CloudOptions cloud_options;
+  SurfaceOptions surface_options;
   bool is_json = false;
   OutputFormat format = OutputFormat::kText;
 
-  absl::Status Run();
+  absl::Status Run(int& exit_code);
+  absl::Status RunOnSurface(int& exit_code);
 };
 
 // The least or largest number of each axis; null without points.
@@ -184,7 +192,33 @@ void PrintInfo(const Json& json) {
   }
 }
 
-absl::Status InfoCommand::Run() {
+absl::Status InfoCommand::RunOnSurface(int& exit_code) {
+  WELLSPACE_ASSIGN_OR_RETURN(const formats::Surface surface, surface_options.Read(path, cloud_options));
+  const core::SurfaceFeatures features = surface_options.FeaturesOf(surface);
+  const core::RunContext context;
+  absl::StatusOr<core::SurfaceReport> report = core::InspectSurface(surface.points, features, kMostThreads, context);
+  if (!report.ok()) {
+    return absl::Status(report.status().code(), absl::StrCat(surface.name, ": ", report.status().message()));
+  }
+  const CloudReport notes = ReportOf(cloud_options, surface.notes, 0);
+  PrintNotes(notes, format, /*quiet=*/false);
+  Json json = SurfaceJson(path, surface, features, *report);
+  if (format == OutputFormat::kJson) {
+    AddNotes(notes, json);
+    PrintJson(json);
+  } else {
+    PrintSurface(json);
+  }
+  exit_code = report->faults.empty() ? kExitOk : kExitFailed;
+  return absl::OkStatus();
+}
+
+absl::Status InfoCommand::Run(int& exit_code) {
+  exit_code = kExitOk;
+  if (surface_options.IsSurface(path, cloud_options)) {
+    return RunOnSurface(exit_code);
+  }
+  WELLSPACE_RETURN_IF_ERROR(surface_options.CheckOther(path));
   cloud_options.keep_attributes = true;
   WELLSPACE_ASSIGN_OR_RETURN(const formats::MeshOrCloud read, formats::ReadMeshOrCloud(path, cloud_options));
   const CloudReport report = ReportOf(cloud_options, read.notes, read.skipped);
@@ -205,20 +239,25 @@ void AddInfoCommand(CLI::App& app, int& exit_code) {
   const auto command = std::make_shared<InfoCommand>();
   CLI::App* info = app.add_subcommand(
       "info",
-      "Tell what is in a file of a mesh or of points: format, dimension, counts, bounds, attributes, and of a mesh its "
-      "boundary, regions and the quality of its simplices");
+      "Tell what is in a file of a mesh, of a surface or of points: format, dimension, counts, bounds, attributes, of "
+      "a "
+      "mesh its boundary, regions and the quality of its simplices, and of a surface its volume, creases, and every "
+      "fault that keeps it from bounding a solid, with its place");
   info->footer(absl::StrCat(kCloudsHelp, kInfoExamples, "\n", kExitCodesHelp));
-  info->add_option("FILE", command->path, "File of a mesh or of points, or - for points on standard input")
+  info->add_option("FILE", command->path,
+                   "File of a mesh, of a surface or of points, or - for points on standard input")
       ->required()
       ->type_name("FILE");
-  AddCloudOptions(*info, command->cloud_options, "FILE");
+  AddCloudOptions(*info, command->cloud_options, "FILE", {"smesh", "poly"});
+  command->surface_options.AddTo(*info, "FILE");
   AddOutput(*info, command->format);
   info->add_flag("--json", command->is_json, "The same as --output json");
   info->callback([command, &exit_code] {
     const Interrupt interrupt(Interrupt::First::kEnd);
     command->format = command->is_json ? OutputFormat::kJson : command->format;
-    const absl::Status status = command->Run();
-    exit_code = status.ok() ? kExitOk : ReportError(status, command->format);
+    if (const absl::Status status = command->Run(exit_code); !status.ok()) {
+      exit_code = ReportError(status, command->format);
+    }
   });
 }
 
