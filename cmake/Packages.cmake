@@ -27,13 +27,13 @@ macro(wellspace_package component name section summary text)
   set(CPACK_DEBIAN_${component}_DESCRIPTION "${summary}\n${text}")
 endmacro()
 
-wellspace_package(RUNTIME wellspace math "quality simplicial meshes of point clouds (tool)"
+wellspace_package(RUNTIME wellspace math "quality meshes of point clouds and planar domains (tool)"
 "Wellspace makes meshes of triangles and tetrahedra of quality from clouds of
 points and planar domains, and simplices up to 6-D. This is the command line
 tool, which meshes by itself or by a server, and checks and draws meshes.")
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SUGGESTS wellspaced)
 
-wellspace_package(SERVER wellspaced math "quality simplicial meshes of point clouds (server)"
+wellspace_package(SERVER wellspaced math "quality meshes of point clouds and planar domains (server)"
 "Wellspace makes meshes of triangles and tetrahedra of quality from clouds of
 points and planar domains, and simplices up to 6-D. This is the server, with
 an API by gRPC. As a service of systemd it listens on the loopback only.")
@@ -42,7 +42,7 @@ set(debian_dir ${PROJECT_SOURCE_DIR}/deploy/debian)
 set(CPACK_DEBIAN_SERVER_PACKAGE_CONTROL_EXTRA ${debian_dir}/wellspaced/postinst ${debian_dir}/wellspaced/prerm
                                               ${debian_dir}/wellspaced/postrm ${debian_dir}/wellspaced/conffiles)
 
-wellspace_package(DEVELOPMENT libwellspace-dev libdevel "quality simplicial meshes of point clouds (C++ libraries)"
+wellspace_package(DEVELOPMENT libwellspace-dev libdevel "quality meshes of point clouds and planar domains (C++ libraries)"
 "Wellspace makes meshes of triangles and tetrahedra of quality from clouds of
 points and planar domains, and simplices up to 6-D. These are its libraries,
 for linking statically: the mesher, the client of its server, and files of
@@ -53,7 +53,7 @@ set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
     "zlib1g-dev, pkg-config")
 list(JOIN CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS ", " CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS)
 
-wellspace_package(PYTHON python3-wellspace python "quality simplicial meshes of point clouds (Python)"
+wellspace_package(PYTHON python3-wellspace python "quality meshes of point clouds and planar domains (Python)"
 "Wellspace makes meshes of triangles and tetrahedra of quality from clouds of
 points and planar domains, and simplices up to 6-D. This is the package for
 Python, a client of the server: arrays of numpy in and out.")

@@ -247,7 +247,7 @@ int Main(int argc, char** argv) {
   flags.server.service.small_workers = 1;
   flags.server.service.max_threads = resources.processors;
   flags.server.service.max_memory_bytes = DefaultMaxMemory(resources);
-  CLI::App app("Makes well-spaced simplicial meshes from clouds of points, as a gRPC service.", "wellspaced");
+  CLI::App app("Makes quality meshes of point clouds and planar domains, as a gRPC service.", "wellspaced");
   Declare(app, flags);
   try {
     app.parse(argc, argv);

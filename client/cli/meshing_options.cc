@@ -45,7 +45,9 @@ void AddNoAttributes(CLI::App& command, bool& no_attributes) {
 }
 
 void MeshingOptions::AddTo(CLI::App& command) {
-  command.add_option("IN", input_, "File of points, or - for standard input")->required()->type_name("FILE");
+  command.add_option("IN", input_, "File of points or of a domain, or - for standard input")
+      ->required()
+      ->type_name("FILE");
   parameters_.AddSpaceTo(command);
   parameters_.AddQualityTo(command);
   remote_.AddTo(command, RemoteCommand::Needs::kAnyServer);

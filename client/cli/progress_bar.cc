@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <iostream>
+#include <optional>
 
+#include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "absl/time/clock.h"
 
 namespace wellspace::cli {
 
@@ -21,31 +24,34 @@ std::string WithThousands(uint64_t number) {
   return text;
 }
 
-std::string ProgressLine(const std::string& phase, double fraction, const std::string& amount) {
-  constexpr int kBarColumns = 30;
+std::string ProgressLine(const std::string& phase, double fraction, const std::string& amount,
+                         const std::string& left) {
+  constexpr size_t kColumns = 79;
+  constexpr int kBarColumns = 24;
   const double part = fraction > 0 ? std::min(fraction, 1.0) : 0;  // also for NaN
   const int filled = static_cast<int>(part * kBarColumns);
-  std::string line = absl::StrFormat("%-10.12s [%s%s] %3d%%  %s", phase, std::string(filled, '#'),
-                                     std::string(kBarColumns - filled, '-'), static_cast<int>(part * 100), amount);
-  return line.substr(0, 79);
-}
-
-std::string ProgressLine(const client::Progress& progress) {
-  return ProgressLine(progress.phase, progress.fraction, WithThousands(progress.vertices) + " vertices");
+  const std::string line =
+      absl::StrFormat("%-10.12s [%s%s] %3d%%  %s", phase, std::string(filled, '#'),
+                      std::string(kBarColumns - filled, '-'), static_cast<int>(part * 100), amount);
+  const std::string with_time = left.empty() ? line : absl::StrCat(line, ", ", left, " left");
+  return with_time.size() <= kColumns ? with_time : line.substr(0, kColumns);
 }
 
 ProgressBar::ProgressBar(bool wanted) : enabled_(wanted && isatty(STDERR_FILENO) == 1) {}
 
 ProgressBar::~ProgressBar() { Clear(); }
 
-void ProgressBar::Update(const client::Progress& progress) { Draw(ProgressLine(progress)); }
-
-void ProgressBar::Update(const std::string& phase, double fraction, const std::string& amount) {
-  Draw(ProgressLine(phase, fraction, amount));
+void ProgressBar::Update(const client::Progress& progress) {
+  Update(progress.phase, progress.fraction, WithThousands(progress.vertices) + " vertices");
 }
 
-void ProgressBar::Draw(const std::string& line) {
-  if (enabled_ && line != drawn_) {
+void ProgressBar::Update(const std::string& phase, double fraction, const std::string& amount) {
+  if (!enabled_) {
+    return;
+  }
+  const std::optional<absl::Duration> left = time_left_.At(fraction, absl::Now());
+  const std::string line = ProgressLine(phase, fraction, amount, left ? TimeText(*left) : "");
+  if (line != drawn_) {
     std::cerr << "\r" << line << "\x1b[K" << std::flush;
     drawn_ = line;
   }

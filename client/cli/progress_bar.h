@@ -1,10 +1,11 @@
-// A line on a terminal that shows how far a mesh is.
+// A line on a terminal that shows how far work is, and how much longer it takes.
 #ifndef WELLSPACE_CLIENT_CLI_PROGRESS_BAR_H_
 #define WELLSPACE_CLIENT_CLI_PROGRESS_BAR_H_
 
 #include <cstdint>
 #include <string>
 
+#include "client/cli/time_left.h"
 #include "client/client.h"
 
 namespace wellspace::cli {
@@ -28,15 +29,15 @@ class ProgressBar {
   void Clear();
 
  private:
-  void Draw(const std::string& line);
-
   const bool enabled_;
+  TimeLeft time_left_;
   std::string drawn_;  // the line on the terminal; empty: none
 };
 
-// The line without colours and control characters, at most 79 columns wide, whatever the fraction is.
-std::string ProgressLine(const std::string& phase, double fraction, const std::string& amount);
-std::string ProgressLine(const client::Progress& progress);
+// The line without colours and control characters, at most 79 columns wide, whatever the fraction is. `left` is the
+// text of the time that is left; empty: not known, or no place for it.
+std::string ProgressLine(const std::string& phase, double fraction, const std::string& amount,
+                         const std::string& left = "");
 
 }  // namespace wellspace::cli
 

@@ -4,6 +4,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "client/cli/closest_word.h"
+#include "client/cli/command_tree.h"
 #include "client/cli/standard_output.h"
 
 namespace wellspace::cli {
@@ -21,7 +23,7 @@ OutputFormat FormatAskedFor(const std::vector<std::string>& arguments) {
 }
 
 // The words that nothing has taken, as they were written.
-std::string Leftover(const CLI::App& app, const std::vector<std::string>& arguments) {
+std::vector<std::string> Leftover(const CLI::App& app, const std::vector<std::string>& arguments) {
   std::vector<std::string> left = app.remaining(/*recurse=*/true);
   std::vector<std::string> in_order;
   for (const std::string& argument : arguments) {
@@ -31,7 +33,36 @@ std::string Leftover(const CLI::App& app, const std::vector<std::string>& argume
       in_order.push_back(argument);
     }
   }
-  return absl::StrJoin(in_order, " ");
+  return in_order;
+}
+
+// " (did you mean mesh?)"; empty if nothing is near.
+std::string Suggestion(const std::string& meant) {
+  return meant.empty() ? std::string() : absl::StrCat(" (did you mean ", meant, "?)");
+}
+
+bool IsOption(const std::string& word) { return word.size() > 1 && word[0] == '-'; }
+
+// The option of `command` that `word` may stand for.
+std::string MeantOption(const CLI::App& command, const std::string& word) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : Command{.name = "", .app = &command}.Options()) {
+    const std::vector<std::string> more = NamesOf(*option);
+    names.insert(names.end(), more.begin(), more.end());
+  }
+  const std::string name = word.substr(0, word.find('='));
+  return name.size() > 2 ? ClosestWord(name, names) : std::string();  // any two letters are near each other
+}
+
+// The command among `below` that `word` may stand for, or one of another place that has this name.
+std::string MeantCommand(const CLI::App& app, const std::vector<std::string>& below, const std::string& word) {
+  std::string meant = ClosestWord(word, below);
+  for (const Command& command : TreeOf(app)) {
+    if (meant.empty() && command.name.ends_with(" " + word)) {
+      meant = command.name;
+    }
+  }
+  return meant;
 }
 
 absl::Status UsageError(const CLI::App& app, const CLI::ParseError& error, const std::vector<std::string>& arguments) {
@@ -42,14 +73,24 @@ absl::Status UsageError(const CLI::App& app, const CLI::ParseError& error, const
     absl::StrAppend(&command, " ", last->get_name());
   }
   std::string message = error.what();
-  const std::string leftover = Leftover(app, arguments);
+  const std::vector<std::string> leftover = Leftover(app, arguments);
   if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr) {
-    message = absl::StrCat("not expected: ", leftover);
+    const auto option = std::find_if(leftover.begin(), leftover.end(), IsOption);
+    message = absl::StrCat("not expected: ", absl::StrJoin(leftover, " "),
+                           Suggestion(option == leftover.end() ? "" : MeantOption(*last, *option)));
   } else if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr && last->get_require_subcommand_min() > 0) {
-    const std::string names = absl::StrJoin(last->get_subcommands([](const CLI::App*) { return true; }), ", ",
-                                            [](std::string* out, const CLI::App* one) { *out += one->get_name(); });
-    message = absl::StrCat(leftover.empty() ? "a command is missing" : absl::StrCat("there is no command ", leftover),
-                           "; expected one of ", names);
+    std::vector<std::string> names;
+    for (const CLI::App* one : last->get_subcommands([](const CLI::App*) { return true; })) {
+      names.push_back(one->get_name());
+    }
+    if (leftover.empty()) {
+      message = "a command is missing";
+    } else if (const std::string& word = leftover.front(); IsOption(word)) {
+      message = absl::StrCat("not expected: ", word, Suggestion(MeantOption(*last, word)), "; a command is missing");
+    } else {
+      message = absl::StrCat("there is no command ", word, Suggestion(MeantCommand(app, names, word)));
+    }
+    absl::StrAppend(&message, "; expected one of ", absl::StrJoin(names, ", "));
   }
   return absl::InvalidArgumentError(absl::StrCat(message, "; see ", command, " --help"));
 }

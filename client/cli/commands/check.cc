@@ -16,6 +16,7 @@
 #include "client/cli/domain_options.h"
 #include "client/cli/exit_codes.h"
 #include "client/cli/interrupt.h"
+#include "client/cli/mesh_paths.h"
 #include "client/cli/options.h"
 #include "client/cli/parameter_options.h"
 #include "client/cli/progress_bar.h"
@@ -28,7 +29,6 @@
 #include "client/formats/io/input_file.h"
 #include "client/formats/io/line_reader.h"
 #include "client/formats/read_cloud.h"
-#include "client/formats/read_mesh.h"
 #include "core/base/status_macros.h"
 #include "core/validate/validate.h"
 #include "core/validate/validate_boundary.h"
@@ -401,7 +401,7 @@ int CheckCommand::Run() {
   if (const absl::Status status = CheckFiles(); !status.ok()) {
     return ReportError(status, format);
   }
-  const absl::StatusOr<formats::Mesh> mesh = formats::ReadMesh(mesh_path);
+  const absl::StatusOr<formats::Mesh> mesh = ReadMeshInput(mesh_path);
   if (!mesh.ok()) {
     return ReportError(mesh.status(), format);
   }

@@ -11,6 +11,7 @@
 #include "client/cli/commands/commands.h"
 #include "client/cli/exit_codes.h"
 #include "client/cli/interrupt.h"
+#include "client/cli/mesh_paths.h"
 #include "client/cli/meshing_options.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/remote_command.h"
@@ -66,7 +67,7 @@ absl::Status ConvertCommand::Convert() {
   files.ReadsMesh("IN", input);
   files.WritesMesh("OUT", output, mesh_format);
   WELLSPACE_RETURN_IF_ERROR(files.Check());
-  WELLSPACE_RETURN_IF_ERROR(formats::CheckMeshOutput(output, mesh_format));
+  WELLSPACE_RETURN_IF_ERROR(CheckMeshOutput(output, mesh_format));
   cloud_options.keep_attributes = !no_attributes;
   WELLSPACE_ASSIGN_OR_RETURN(formats::MeshOrCloud read, formats::ReadMeshOrCloud(input, cloud_options));
   if (no_attributes) {

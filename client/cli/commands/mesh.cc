@@ -1,4 +1,4 @@
-// wellspace mesh: a mesh of a cloud.
+// wellspace mesh: a mesh of a cloud or a domain.
 #include <iostream>
 #include <memory>
 #include <string>
@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/cli/commands/commands.h"
 #include "client/cli/exit_codes.h"
+#include "client/cli/mesh_paths.h"
 #include "client/cli/meshing_options.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/statistics.h"
@@ -13,7 +14,6 @@
 #include "client/formats/file_plan.h"
 #include "client/formats/io/input_file.h"
 #include "client/formats/io/line_reader.h"
-#include "client/formats/write_mesh.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::cli {
@@ -22,6 +22,7 @@ namespace {
 constexpr char kMeshExamples[] =
     "Examples:\n"
     "  wellspace mesh coast.csv -o coast.vtu --rho 1.5 --stats -\n"
+    "  wellspace mesh lake.geojson -o lake.msh --size 0.01\n"
     "  wellspace mesh cow.csv -o cow.node --domain -1,-1,-1,1,1,1 --server mesher:7233\n"
     "  wellspace mesh cow.csv -o cow.vtu --size 0.2 --size-box -0.5,0,0,0,0.5,0.5,0.05\n"
     "  wellspace mesh cow.csv -o cow.vtu --size-field sizes.csv --gradation 0.2\n";
@@ -44,7 +45,7 @@ absl::Status MeshCommand::CheckOptions() const {
   if (options.has_figures_on_stdout() && output == formats::kStandardStream) {
     return absl::InvalidArgumentError("--stats or --output json, and --out: only one of them can be standard output");
   }
-  WELLSPACE_RETURN_IF_ERROR(formats::CheckMeshOutput(output, format, options.dimension()));
+  WELLSPACE_RETURN_IF_ERROR(CheckMeshOutput(output, format, options.dimension()));
   formats::FilePlan files;
   options.AddFilesTo(files);
   files.WritesMesh("--out", output, format);
@@ -54,7 +55,7 @@ absl::Status MeshCommand::CheckOptions() const {
 absl::Status MeshCommand::Mesh(client::Client& client, const client::MeshOptions& mesh_options,
                                const formats::PointCloud& cloud, const client::CallOptions& call) const {
   // Now that the dimension is known for sure, and before hours of work.
-  WELLSPACE_RETURN_IF_ERROR(formats::CheckMeshOutput(output, format, cloud.dimension, mesh_options.pump_weights));
+  WELLSPACE_RETURN_IF_ERROR(CheckMeshOutput(output, format, cloud.dimension, mesh_options.pump_weights));
   client::MeshFile file(output, format, call.stop);
   file.KeepInputVertices();
   file.AddAttributes(cloud.attributes);
@@ -98,7 +99,7 @@ int MeshCommand::Run() {
 
 void AddMeshCommand(CLI::App& app, int& exit_code) {
   const auto command = std::make_shared<MeshCommand>();
-  CLI::App* mesh = app.add_subcommand("mesh", "Mesh a point cloud");
+  CLI::App* mesh = app.add_subcommand("mesh", "Mesh a point cloud, or a domain in the plane");
   mesh->footer(absl::StrCat(kCloudsHelp, kMeshesHelp, kMeshExamples, "\n", kExitCodesHelp));
   command->options.AddTo(*mesh);
   AddMeshOutput(*mesh, command->output, command->format, command->no_boundary);

@@ -7,12 +7,12 @@
 #include "client/cli/commands/commands.h"
 #include "client/cli/exit_codes.h"
 #include "client/cli/interrupt.h"
+#include "client/cli/mesh_paths.h"
 #include "client/cli/options.h"
 #include "client/cli/remote_command.h"
 #include "client/cli/render/painter.h"
 #include "client/cli/render/scene.h"
 #include "client/formats/file_plan.h"
-#include "client/formats/read_mesh.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::cli {
@@ -39,7 +39,7 @@ absl::Status RenderCommand::Render() const {
   files.ReadsMesh("MESH", mesh_path);
   files.Writes("--out", picture_path);
   WELLSPACE_RETURN_IF_ERROR(files.Check());
-  WELLSPACE_ASSIGN_OR_RETURN(const formats::Mesh mesh, formats::ReadMesh(mesh_path));
+  WELLSPACE_ASSIGN_OR_RETURN(const formats::Mesh mesh, ReadMeshInput(mesh_path));
   render::View view;
   view.up = up[0] - 'x';
   if (colour != "auto") {

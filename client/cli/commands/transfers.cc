@@ -9,6 +9,7 @@
 #include "client/cli/cloud_options.h"
 #include "client/cli/commands/commands.h"
 #include "client/cli/domain_options.h"
+#include "client/cli/mesh_paths.h"
 #include "client/cli/meshing_options.h"
 #include "client/cli/options.h"
 #include "client/cli/progress_bar.h"
@@ -20,7 +21,6 @@
 #include "client/formats/file_plan.h"
 #include "client/formats/io/input_file.h"
 #include "client/formats/io/line_reader.h"
-#include "client/formats/write_mesh.h"
 #include "client/point_source.h"
 #include "core/base/status_macros.h"
 
@@ -191,7 +191,7 @@ absl::Status DownloadCommand::Check() const {
   if (remote.json() && path == formats::kStandardStream) {
     return absl::InvalidArgumentError("--output json and --out: only one of them can be standard output");
   }
-  WELLSPACE_RETURN_IF_ERROR(formats::CheckMeshOutput(path, format));
+  WELLSPACE_RETURN_IF_ERROR(CheckMeshOutput(path, format));
   formats::FilePlan files;
   remote.AddFilesTo(files);
   files.WritesMesh("--out", path, format);
@@ -241,7 +241,9 @@ void AddUpload(CLI::App& app, int& exit_code) {
   CLI::App* upload = app.add_subcommand("upload", "Add the points of a file, or a domain, to a session");
   upload->footer(absl::StrCat(kCloudsHelp, "\n", kExitCodesHelp));
   AddSession(*upload, command->session);
-  upload->add_option("IN", command->input, "File of points, or - for standard input")->required()->type_name("FILE");
+  upload->add_option("IN", command->input, "File of points or of a domain, or - for standard input")
+      ->required()
+      ->type_name("FILE");
   AddCloudOptions(*upload, command->cloud_options, "IN", {"poly", "geojson"});
   command->domain.AddTo(*upload);
   AddCount(

@@ -11,6 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "absl/time/time.h"
+#include "client/cli/closest_word.h"
 #include "client/cli/exit_codes.h"
 #include "client/cli/helpful_threads.h"
 #include "client/cli/interrupt.h"
@@ -19,6 +21,7 @@
 #include "client/cli/options.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/statistics.h"
+#include "client/cli/time_left.h"
 #include "client/formats/io/output_file.h"
 #include "tests/support/temporary_folder.h"
 
@@ -27,6 +30,8 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::Optional;
 
 TEST(WithThousandsTest, GroupsByThree) {
   EXPECT_EQ(WithThousands(0), "0");
@@ -36,21 +41,15 @@ TEST(WithThousandsTest, GroupsByThree) {
 }
 
 TEST(ProgressLineTest, ShowsPhaseFractionAndVerticesWithin79Columns) {
-  const std::string line = ProgressLine({.phase = "refinement",
-                                         .vertices = 1234567,
-                                         .estimated_vertices = 0,
-                                         .simplices = 0,
-                                         .fraction = 0.5,
-                                         .sequence = 0});
-  EXPECT_EQ(line, "refinement [###############---------------]  50%  1,234,567 vertices");
-  const std::string longest = ProgressLine({.phase = std::string(100, 'x'),
-                                            .vertices = ~uint64_t{0},
-                                            .estimated_vertices = 0,
-                                            .simplices = 0,
-                                            .fraction = 7,
-                                            .sequence = 0});
-  EXPECT_LE(longest.size(), 79u);
-  EXPECT_THAT(longest, HasSubstr("100%"));
+  const std::string line = ProgressLine("refinement", 0.5, "1,234,567 vertices");
+  EXPECT_EQ(line, "refinement [############------------]  50%  1,234,567 vertices");
+  EXPECT_EQ(ProgressLine("refinement", 0.5, "1,234,567 vertices", "2 h 5 min"), line + ", 2 h 5 min left");
+  for (const char* left : {"", "12 s"}) {
+    const std::string longest = ProgressLine(std::string(100, 'x'), 7, std::string(100, '9') + " vertices", left);
+    EXPECT_EQ(longest.size(), 79u);
+    EXPECT_THAT(longest, HasSubstr("100%"));
+    EXPECT_THAT(longest, Not(HasSubstr("left")));
+  }
 }
 
 TEST(ProgressLineTest, TakesAnyFraction) {
@@ -61,6 +60,48 @@ TEST(ProgressLineTest, TakesAnyFraction) {
   }
   EXPECT_EQ(ProgressLine("tree", kInfinity, "0 vertices"), ProgressLine("tree", 1, "0 vertices"));
   EXPECT_EQ(ProgressLine("tree", 1e300, "0 vertices"), ProgressLine("tree", 1, "0 vertices"));
+}
+
+TEST(TimeLeftTest, IsThatOfTheMeanSpeed) {
+  const absl::Time start = absl::UnixEpoch();
+  TimeLeft left;
+  EXPECT_EQ(left.At(0, start - absl::Hours(1)), std::nullopt);  // it waited in a queue
+  EXPECT_EQ(left.At(0.1, start), std::nullopt);
+  EXPECT_EQ(left.At(0.11, start + absl::Seconds(100)), std::nullopt);  // one percent says nothing
+  EXPECT_EQ(left.At(0.2, start + absl::Seconds(1)), std::nullopt);     // nor does a second
+  EXPECT_THAT(left.At(0.35, start + absl::Seconds(10)), Optional(absl::Seconds(26)));
+  EXPECT_THAT(left.At(0.6, start + absl::Seconds(10)), Optional(absl::Seconds(8)));
+  for (const double fraction : {1.0, 2.0, -1.0, std::nan(""), std::numeric_limits<double>::infinity()}) {
+    EXPECT_EQ(left.At(fraction, start + absl::Seconds(10)), std::nullopt) << fraction;
+  }
+}
+
+TEST(TimeLeftTest, TextIsRoundedUp) {
+  EXPECT_EQ(TimeText(absl::Milliseconds(1)), "1 s");
+  EXPECT_EQ(TimeText(absl::Seconds(59)), "59 s");
+  EXPECT_EQ(TimeText(absl::Seconds(59.5)), "1 min");
+  EXPECT_EQ(TimeText(absl::Seconds(61)), "2 min");
+  EXPECT_EQ(TimeText(absl::Minutes(60)), "1 h 0 min");
+  EXPECT_EQ(TimeText(absl::Minutes(125)), "2 h 5 min");
+  EXPECT_EQ(TimeText(absl::Hours(99)), "99 h 0 min");
+  EXPECT_EQ(TimeText(absl::Hours(100)), "");
+  EXPECT_EQ(TimeText(absl::InfiniteDuration()), "");
+}
+
+TEST(ClosestWordTest, IsTheNearestOrTheOnlyOneThatStartsSo) {
+  const std::vector<std::string> words = {"mesh", "check", "render", "refine", "server", "session"};
+  EXPECT_EQ(ClosestWord("mehs", words), "mesh");
+  EXPECT_EQ(ClosestWord("msh", words), "mesh");
+  EXPECT_EQ(ClosestWord("meshes", words), "mesh");
+  EXPECT_EQ(ClosestWord("chekc", words), "check");
+  EXPECT_EQ(ClosestWord("rend", words), "render");
+  EXPECT_EQ(ClosestWord("re", words), "");  // two start so
+  EXPECT_EQ(ClosestWord("knit", words), "");
+  EXPECT_EQ(ClosestWord("", words), "");
+  EXPECT_EQ(ClosestWord(std::string(1 << 20, 'm'), words), "");
+  EXPECT_EQ(EditDistance("kitten", "sitting"), 3u);
+  EXPECT_EQ(EditDistance("ab", "ba"), 1u);
+  EXPECT_EQ(EditDistance("", "abc"), 3u);
 }
 
 TEST(JsonTextTest, HasNoControlCharactersAndNoBytesThatAreNoText) {

@@ -156,7 +156,7 @@ TEST_F(OperationCommandsTest, AnyFractionIsDrawn) {
   EXPECT_THAT(result.out, ::testing::HasSubstr("succeeded"));
   std::string drawn(4096, '\0');
   drawn.resize(std::max<ssize_t>(0, read(terminal, drawn.data(), drawn.size())));
-  EXPECT_THAT(drawn, ::testing::HasSubstr("[------------------------------]   0%"));
+  EXPECT_THAT(drawn, ::testing::HasSubstr("[------------------------]   0%"));
   close(error);
   close(terminal);
 }

@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/client/cli/closed_port.h"
@@ -85,6 +86,48 @@ TEST_F(UsageTest, WrongUsageIsExitCode2) {
   }
 }
 
+// A file that is of another kind than the command wants is told with the command for it.
+TEST_F(UsageTest, FilesOfAnotherKindAreTold) {
+  const std::string cloud = folder_.Write("cloud.csv", kPlane);
+  const std::string domain = folder_.Write("lake.poly", "0 2 0 0\n");
+  const std::string picture = Path("a.png");
+  const std::string is_cloud =
+      cloud + ": this is a cloud, not a mesh; `wellspace mesh " + cloud + " -o " + Path("cloud.vtu") +
+      "` makes a mesh of it, which can be given here, and `wellspace info " + cloud + "` tells what is in it";
+  const std::string is_picture = "cannot write " + picture + ": this is a picture, not a mesh; write " + Path("a.vtu") +
+                                 ", of which `wellspace render " + Path("a.vtu") + " -o " + picture +
+                                 "` makes a picture";
+  const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
+      {{"check", cloud}, is_cloud},
+      {{"render", cloud, "-o", picture}, is_cloud},
+      {{"check", Path("cloud.csv.gz")}, "cloud.csv.gz -o " + Path("cloud.vtu") + "` makes"},
+      {{"check", domain},
+       domain + ": this is a domain, not a mesh; `wellspace mesh " + domain + " -o " + Path("lake.vtu") +
+           "` makes a mesh of it, which can be given here [INVALID_ARGUMENT]"},
+      {{"check", picture}, picture + ": this is a picture, not a mesh [INVALID_ARGUMENT]"},
+      {{"mesh", cloud, "-o", picture}, is_picture},
+      {{"convert", cloud, picture}, is_picture},
+      {{"download", "one", "-o", picture, "--server", "localhost:1"}, is_picture},
+      {{"mesh", cloud, "-o", Path("a.stl")}, "no format is known by the extension \".stl\""},
+  };
+  for (const auto& [arguments, message] : cases) {
+    const RunResult result = RunWellspace(arguments);
+    EXPECT_EQ(result.exit_code, 2) << testing::PrintToString(arguments);
+    EXPECT_THAT(result.err, HasSubstr(message)) << testing::PrintToString(arguments);
+    EXPECT_EQ(folder_.FileCount(), 2) << testing::PrintToString(arguments);
+  }
+}
+
+TEST_F(UsageTest, HelpSpeaksOfDomains) {
+  EXPECT_THAT(RunWellspace({"--help"}).out, StartsWith("Quality simplicial meshes of point clouds and of domains"));
+  for (const char* command : {"mesh", "estimate", "upload"}) {
+    const std::string help = RunWellspace({command, "--help"}).out;
+    EXPECT_THAT(help.substr(0, help.find('\n')), HasSubstr("domain")) << command;
+    EXPECT_THAT(help, HasSubstr("File of points or of a domain")) << command;
+  }
+  EXPECT_THAT(RunWellspace({"manual"}).out, HasSubstr("meshes of point clouds and of domains"));
+}
+
 // What is wrong is said with where to read more, for programs as JSON.
 TEST_F(UsageTest, WrongUsageIsExplained) {
   struct Case {
@@ -93,13 +136,22 @@ TEST_F(UsageTest, WrongUsageIsExplained) {
   };
   const std::vector<Case> cases = {
       {{}, "a command is missing; expected one of mesh, estimate, "},
-      {{"meshes"}, "there is no command meshes; expected one of mesh, "},
+      {{"knit", "a.csv"}, "there is no command knit; expected one of mesh, "},
+      {{"mehs", "a.csv", "-o", "a.vtu"}, "there is no command mehs (did you mean mesh?); expected one of mesh, "},
+      {{"meshes"}, "there is no command meshes (did you mean mesh?); expected one of mesh, "},
+      {{"est"}, "there is no command est (did you mean estimate?); expected one of mesh, "},
+      {{"create", "one"}, "there is no command create (did you mean session create?); expected one of mesh, "},
+      {{"--versoin"},
+       "not expected: --versoin (did you mean --version?); a command is missing; expected one of mesh, "},
+      {{"session", "delte"}, "there is no command delte (did you mean delete?); expected one of create, "},
       {{"session"},
        "a command is missing; expected one of create, list, show, update, delete; see wellspace session --help"},
       {{"session", "make"}, "there is no command make; expected one of create, "},
       {{"mesh"}, "IN is required; see wellspace mesh --help"},
       {{"mesh", "a.csv", "-o", "a.vtu", "--bogus", "7", "more"},
        "not expected: --bogus 7 more; see wellspace mesh --help"},
+      {{"mesh", "a.csv", "-o", "a.vtu", "--sise=7"},
+       "not expected: --sise=7 (did you mean --size?); see wellspace mesh --help"},
       {{"mesh", "a.csv", "-o", "a.vtu", "--timeout", "0"}, "--timeout: expected a number above 0, got \"0\""},
       {{"mesh", "a.csv", "-o", "a.vtu", "--max-vertices", "-1"},
        "--max-vertices: expected a whole number of at least 1, got \"-1\""},
