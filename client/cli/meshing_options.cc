@@ -15,7 +15,8 @@ namespace wellspace::cli {
 const char kCloudsHelp[] =
     "Clouds:  .csv .tsv .txt .dat (columns separated by commas, semicolons or blanks; a header may name x, y, z, or\n"
     "         lon, lat and the like), .xyz, .asc, .pts, .node, .npy, .pcd, .las, vertices of .ply, .obj, .off, .stl,\n"
-    "         .vtk, .vtp and .vtu; each may be compressed (.csv.gz); \"-\" is standard input (csv, or --input-format)\n"
+    "         .vtk, .vtp, .vtu, .msh, .mesh and .npz; each but .npz may be compressed (.csv.gz); \"-\" is standard\n"
+    "         input (csv, or --input-format)\n"
     "Domains: in 2-D, .poly (Triangle's, with .node) and .geojson; with --segments lines of .obj and polylines of "
     ".csv\n";
 

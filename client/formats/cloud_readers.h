@@ -32,6 +32,9 @@ absl::Status ReadLas(LineReader& reader, const CloudOptions& options, PointCloud
 absl::Status ReadVtkPoints(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
 absl::Status ReadVtp(InputFile& file, const CloudOptions& options, PointCloud& cloud);
 absl::Status ReadVtuPoints(InputFile& file, const CloudOptions& options, PointCloud& cloud);
+absl::Status ReadMshPoints(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
+absl::Status ReadMeditPoints(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
+absl::Status ReadNpzPoints(InputFile& file, const CloudOptions& options, PointCloud& cloud);
 
 // These leave options.columns to TakeColumns, which is called with what they return when no dimension was asked for.
 absl::Status ReadNode(LineReader& reader, const CloudOptions& options, PointCloud& cloud);

@@ -57,10 +57,10 @@ absl::StatusOr<MeshOrCloud> ReadMeshOrCloud(const std::string& path, const Cloud
       return read;
     }
     refusal = mesh.status();
-    if (mesh_format == "node" && !absl::IsNotFound(refusal)) {
-      // Both files are there: points alone would be half of it.
+    if (!IsVtkFormat(mesh_format) && !absl::IsNotFound(refusal)) {
+      // Of .node both files are there, and the other formats have meshes: points alone would be half of it.
       return absl::Status(refusal.code(),
-                          absl::StrCat(refusal.message(), "; --input-format node reads the points alone"));
+                          absl::StrCat(refusal.message(), "; --input-format ", mesh_format, " reads the points alone"));
     }
   }
   absl::StatusOr<PointCloud> cloud = ReadCloud(path, options);

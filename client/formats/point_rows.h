@@ -51,6 +51,9 @@ std::vector<std::string> DataNames(const std::string& name, uint64_t components)
 absl::Status AddAllRows(const std::vector<std::string>& names, std::span<const std::vector<double>> columns,
                         const CloudOptions& options, PointCloud& cloud);
 
+// The same of points x 2 or x 3, row-major, that have nothing but coordinates.
+absl::Status AddAllPoints(std::span<const double> points, size_t width, const CloudOptions& options, PointCloud& cloud);
+
 }  // namespace wellspace::formats
 
 #endif  // WELLSPACE_CLIENT_FORMATS_POINT_ROWS_H_

@@ -1,11 +1,15 @@
 #include "client/formats/read_cloud.h"
 
+#include <algorithm>
+#include <array>
 #include <span>
+#include <string_view>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "client/formats/cloud_readers.h"
 #include "client/formats/io/input_file.h"
+#include "client/formats/io/number.h"
 #include "client/formats/io/open_input.h"
 #include "client/formats/registry.h"
 #include "core/base/status_macros.h"
@@ -55,8 +59,58 @@ std::span<const Format<CloudReader>> CloudReaders() {
       {"vtk", {".vtk"}, ReadText<ReadVtkPoints>},
       {"vtp", {".vtp"}, ReadVtp},
       {"vtu", {".vtu"}, ReadVtuPoints},
+      {"msh", {".msh"}, ReadText<ReadMshPoints>},
+      {"medit", {".mesh"}, ReadText<ReadMeditPoints>},
+      {"npz", {".npz"}, ReadNpzPoints},
   };
   return readers;
+}
+
+// Formats in which points have three coordinates, in the plane, too.
+constexpr std::array<std::string_view, 5> kPadded = {"vtk", "vtp", "vtu", "msh", "medit"};
+
+// Of points that all have the same z: takes them in the plane if that is 0 and only there since the format wants it, or
+// tells how to take them so. Points of other formats have the dimension that was asked for.
+//
+// Errors:     INVALID_ARGUMENT for points in space where those of the plane are wanted.
+absl::Status TakeFlatPoints(const CloudOptions& options, bool is_padded, PointCloud& cloud) {
+  if (cloud.dimension != 3 || !options.columns.empty() || options.dimension == 3) {
+    return absl::OkStatus();
+  }
+  const std::vector<double>& points = cloud.points;
+  if (cloud.size() == 0) {
+    cloud.dimension = is_padded && options.dimension == 2 ? 2 : 3;
+    return absl::OkStatus();
+  }
+  bool is_flat = true;
+  for (size_t i = 2; i < points.size() && is_flat; i += 3) {
+    is_flat = points[i] == points[2];
+  }
+  if (is_padded && is_flat && points[2] == 0) {
+    const size_t count = cloud.size();
+    for (size_t i = 0; i < count; ++i) {
+      cloud.points[2 * i] = points[3 * i];
+      cloud.points[2 * i + 1] = points[3 * i + 1];
+    }
+    cloud.points.resize(2 * count);
+    cloud.dimension = 2;
+    if (options.dimension == 0) {
+      cloud.notes.push_back(absl::StrCat(
+          cloud.name, ": all points have z = 0, and are taken in the plane; --columns x,y,z takes them in space"));
+    }
+    return absl::OkStatus();
+  }
+  if (options.dimension == 2) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(cloud.name, ": expected 2 coordinates, got 3; --columns x,y takes 2 of them"));
+  }
+  if (is_flat && cloud.size() > 3) {
+    std::string z;
+    AppendNumber(points[2], z);
+    cloud.notes.push_back(absl::StrCat(cloud.name, ": all points have z = ", z,
+                                       ", and are taken in space; --columns x,y takes them in the plane"));
+  }
+  return absl::OkStatus();
 }
 
 }  // namespace
@@ -77,7 +131,14 @@ absl::StatusOr<PointCloud> ReadCloud(const std::string& path, const CloudOptions
   WELLSPACE_ASSIGN_OR_RETURN(InputFile file, OpenInflated(path));
   PointCloud cloud;
   cloud.name = file.name();
-  WELLSPACE_RETURN_IF_ERROR((*row)->handler(file, options, cloud));
+  const bool is_padded = std::find(kPadded.begin(), kPadded.end(), (*row)->name) != kPadded.end();
+  // Two coordinates of points that have three in any such file.
+  CloudOptions wanted = options;
+  if (is_padded && options.columns.empty() && options.dimension == 2) {
+    wanted.dimension = 0;
+  }
+  WELLSPACE_RETURN_IF_ERROR((*row)->handler(file, wanted, cloud));
+  WELLSPACE_RETURN_IF_ERROR(TakeFlatPoints(options, is_padded, cloud));
   // Columns in which words stand were given up.
   std::erase_if(cloud.attributes, [&](const PointAttribute& attribute) {
     return cloud.size() == 0 || attribute.values.size() != cloud.size();

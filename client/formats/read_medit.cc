@@ -10,10 +10,12 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "client/formats/boundary.h"
+#include "client/formats/cloud_readers.h"
 #include "client/formats/io/field_reader.h"
 #include "client/formats/io/input_file.h"
 #include "client/formats/mesh_readers.h"
 #include "client/formats/names.h"
+#include "client/formats/point_rows.h"
 #include "client/formats/regions.h"
 #include "core/base/status_macros.h"
 
@@ -30,21 +32,44 @@ class MeditReader {
   MeditReader& operator=(const MeditReader&) = delete;
 
   absl::StatusOr<Mesh> Read() {
+    bool has_end = false;
+    WELLSPACE_RETURN_IF_ERROR(ReadSections(/*ends_with_vertices=*/false, has_end));
+    if (!has_vertices_ || (!triangles_.is_there && !tetrahedra_.is_there)) {
+      return reader_.Error(
+          absl::StrCat("the file ends; expected ", has_vertices_ ? "Triangles or Tetrahedra" : "Vertices"));
+    }
+    if (has_end) {
+      // What we have written there are comments with names. It is nothing that a mesh needs, whatever it is.
+      std::string_view line;
+      reader_.NextContent(line);
+    }
+    return MakeMesh();
+  }
+
+  // The vertices alone, whatever the elements are. What follows them is not looked at.
+  absl::Status ReadPoints(const CloudOptions& options, PointCloud& cloud) {
+    may_be_invalid_ = options.skip_invalid;
+    bool has_end = false;
+    WELLSPACE_RETURN_IF_ERROR(ReadSections(/*ends_with_vertices=*/true, has_end));
+    return has_vertices_ ? AddAllPoints(mesh_.points, mesh_.dimension, options, cloud)
+                         : reader_.Error("the file ends; expected Vertices");
+  }
+
+ private:
+  // Reads up to the end of the file or to the word that ends it.
+  absl::Status ReadSections(bool ends_with_vertices, bool& has_end) {
     uint64_t version = 0;
     std::string_view word;
     if (!fields_.Next(word) || word != "MeshVersionFormatted") {
       return reader_.EndError("expected \"MeshVersionFormatted\" at the start of the file");
     }
     WELLSPACE_RETURN_IF_ERROR(fields_.NextWhole("the version", kMaxCount, version));
-    bool has_end = false;
-    while (fields_.Next(word)) {
-      if (word == "End") {
-        has_end = true;
-        break;
-      }
+    while (!has_end && !(ends_with_vertices && has_vertices_) && fields_.Next(word)) {
       // What follows a word that is not known is skipped up to the next word.
       absl::Status status;
-      if (word == "Dimension") {
+      if (word == "End") {
+        has_end = true;
+      } else if (word == "Dimension") {
         status = ReadDimension();
       } else if (word == "Vertices") {
         status = ReadVertices();
@@ -63,22 +88,9 @@ class MeditReader {
         return status;
       }
     }
-    if (!reader_.status().ok()) {
-      return reader_.status();
-    }
-    if (!has_vertices_ || (!triangles_.is_there && !tetrahedra_.is_there)) {
-      return reader_.Error(
-          absl::StrCat("the file ends; expected ", has_vertices_ ? "Triangles or Tetrahedra" : "Vertices"));
-    }
-    if (has_end) {
-      // What we have written there are comments with names. It is nothing that a mesh needs, whatever it is.
-      std::string_view line;
-      reader_.NextContent(line);
-    }
-    return MakeMesh();
+    return reader_.status();
   }
 
- private:
   // Elements of one kind, as they are in the file.
   struct Elements {
     int corners;
@@ -144,7 +156,7 @@ class MeditReader {
     for (uint64_t vertex = 0; vertex < vertices_; ++vertex) {
       for (int axis = 0; axis < mesh_.dimension; ++axis) {
         double value = 0;
-        WELLSPACE_RETURN_IF_ERROR(fields_.NextNumber(kNames[axis], value));
+        WELLSPACE_RETURN_IF_ERROR(fields_.NextCoordinate(kNames[axis], may_be_invalid_, value));
         mesh_.points.push_back(value);
       }
       WELLSPACE_RETURN_IF_ERROR(fields_.Skip("the reference of a vertex"));
@@ -199,6 +211,7 @@ class MeditReader {
   RegionCollector regions_;
   uint64_t vertices_ = 0;
   bool has_vertices_ = false;
+  bool may_be_invalid_ = false;  // coordinates may be not finite
 };
 
 }  // namespace
@@ -207,6 +220,10 @@ absl::StatusOr<Mesh> ReadMedit(const std::string& path) {
   WELLSPACE_ASSIGN_OR_RETURN(InputFile file, InputFile::Open(path));
   LineReader reader(std::move(file));
   return MeditReader(reader).Read();
+}
+
+absl::Status ReadMeditPoints(LineReader& reader, const CloudOptions& options, PointCloud& cloud) {
+  return MeditReader(reader).ReadPoints(options, cloud);
 }
 
 }  // namespace wellspace::formats

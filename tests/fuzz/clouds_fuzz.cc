@@ -89,6 +89,13 @@ constexpr std::array kChoices = {
     Choice{"vtu", 3, "", false, true},
     Choice{"csv", 0, "", true, true},
     Choice{"ply", 0, "", true, true},
+    // From 'g' on.
+    Choice{"msh", 0},
+    Choice{"medit", 0},
+    Choice{"npz", 0},
+    Choice{"msh", 2, "", true},
+    Choice{"medit", 0, "yx", true},
+    Choice{"npz", 0, "21", true},
 };
 
 void RequireCloud(const PointCloud& cloud, const CloudOptions& options) {
@@ -110,7 +117,8 @@ void RequireCloud(const PointCloud& cloud, const CloudOptions& options) {
     Require(options.keep_attributes, "attributes are kept only if that was asked for");
     Require(attribute.values.size() == cloud.size(), "every point has all attributes");
   }
-  constexpr std::array<std::string_view, 8> kMayBeBinary = {"npy", "ply", "stl", "pcd", "las", "vtk", "vtp", "vtu"};
+  constexpr std::array<std::string_view, 11> kMayBeBinary = {"npy", "ply", "stl", "pcd",   "las", "vtk",
+                                                             "vtp", "vtu", "msh", "medit", "npz"};
   if (cloud.lines.size() == 0 &&
       std::find(kMayBeBinary.begin(), kMayBeBinary.end(), options.format) != kMayBeBinary.end()) {
     Require(cloud.rows.size() == cloud.size() || (cloud.rows.size() == 0 && cloud.skipped == 0),

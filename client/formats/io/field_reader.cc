@@ -1,8 +1,10 @@
 #include "client/formats/io/field_reader.h"
 
+#include <limits>
 #include <string>
 
 #include "absl/strings/str_cat.h"
+#include "client/formats/coordinate.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::formats {
@@ -30,6 +32,24 @@ absl::Status FieldReader::NextNumber(std::string_view what, double& value) {
   WELLSPACE_RETURN_IF_ERROR(NextOf(what, field));
   const absl::Status status = ParseFinite(field, value);
   return status.ok() ? status : reader_.Error(absl::StrCat(std::string(what), ": ", status.message()));
+}
+
+absl::Status FieldReader::NextCoordinate(std::string_view what, bool may_be_invalid, double& value) {
+  if (!may_be_invalid) {
+    return NextNumber(what, value);
+  }
+  std::string_view field;
+  WELLSPACE_RETURN_IF_ERROR(NextOf(what, field));
+  switch (ReadCoordinate(field, value)) {
+    case CoordinateKind::kFinite:
+      return absl::OkStatus();
+    case CoordinateKind::kInvalid:
+      value = std::numeric_limits<double>::quiet_NaN();
+      return absl::OkStatus();
+    case CoordinateKind::kNone:
+      break;
+  }
+  return reader_.Error(absl::StrCat(std::string(what), ": ", CoordinateError(field).message()));
 }
 
 absl::Status FieldReader::NextWhole(std::string_view what, uint64_t limit, uint64_t& value) {

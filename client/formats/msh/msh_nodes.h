@@ -28,11 +28,14 @@ class MshNodes {
   // Rows of three coordinates, by node; none are left.
   std::vector<double> TakePoints() { return std::move(points_); }
 
+  // Lets coordinates be not finite.
+  void AllowInvalid() { may_be_invalid_ = true; }
+
   // Reads the number of a node, or the coordinates of the next one.
   absl::Status ReadNumber() { return file_.Size("the number of a node", kAnyNumber, numbers_.emplace_back()); }
   absl::Status ReadPoint() {
     for (const char* what : {"x of a node", "y of a node", "z of a node"}) {
-      WELLSPACE_RETURN_IF_ERROR(file_.Number(what, points_.emplace_back()));
+      WELLSPACE_RETURN_IF_ERROR(file_.Coordinate(what, may_be_invalid_, points_.emplace_back()));
     }
     return absl::OkStatus();
   }
@@ -87,6 +90,7 @@ class MshNodes {
 
  private:
   MshNumbers& file_;
+  bool may_be_invalid_ = false;
   std::vector<uint64_t> numbers_;    // by node
   std::vector<double> points_;       // nodes x 3
   std::vector<uint32_t> by_number_;  // the nodes, sorted; empty: they are numbered from 1 on

@@ -100,13 +100,16 @@ class MshNumbers {
   absl::Status Int(const char* what, uint64_t limit, uint64_t& value) {
     return is_binary_ ? TakeWord<int32_t>(what, limit, value) : fields_.NextWhole(what, limit, value);
   }
-  absl::Status Number(const char* what, double& value) {
+  absl::Status Number(const char* what, double& value) { return Coordinate(what, /*may_be_invalid=*/false, value); }
+  // The same; not finite, if that `may_be_invalid`.
+  absl::Status Coordinate(const char* what, bool may_be_invalid, double& value) {
     if (!is_binary_) {
-      return fields_.NextNumber(what, value);
+      return fields_.NextCoordinate(what, may_be_invalid, value);
     }
     WELLSPACE_RETURN_IF_ERROR(TakeBytes(what, value));
-    return std::isfinite(value) ? absl::OkStatus()
-                                : ValueError(absl::StrCat(what, ": expected a finite number, got ", value));
+    return may_be_invalid || std::isfinite(value)
+               ? absl::OkStatus()
+               : ValueError(absl::StrCat(what, ": expected a finite number, got ", value));
   }
   absl::Status SignedInt(const char* what, int32_t& value) {
     if (is_binary_) {

@@ -11,12 +11,14 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "client/formats/boundary.h"
+#include "client/formats/cloud_readers.h"
 #include "client/formats/io/field_reader.h"
 #include "client/formats/io/input_file.h"
 #include "client/formats/mesh_readers.h"
 #include "client/formats/msh/msh.h"
 #include "client/formats/msh/msh_nodes.h"
 #include "client/formats/msh/msh_numbers.h"
+#include "client/formats/point_rows.h"
 #include "client/formats/regions.h"
 #include "core/base/status_macros.h"
 
@@ -50,12 +52,32 @@ class MshReader {
         numbers_name_(numbers.empty() ? "" : absl::StrCat("\"", numbers, "\"")) {}
 
   absl::StatusOr<Mesh> Read() {
+    WELLSPACE_RETURN_IF_ERROR(ReadSections(/*ends_with_nodes=*/false));
+    if (!reader_.status().ok() || !has_nodes_ || !has_elements_) {
+      return reader_.EndError(has_nodes_ ? "the file ends; expected \"$Elements\""
+                                         : "the file ends; expected \"$Nodes\"");
+    }
+    return MakeMesh();
+  }
+
+  // The nodes alone, whatever the elements are. What follows them is not looked at.
+  absl::Status ReadPoints(const CloudOptions& options, PointCloud& cloud) {
+    if (options.skip_invalid) {
+      nodes_.AllowInvalid();
+    }
+    WELLSPACE_RETURN_IF_ERROR(ReadSections(/*ends_with_nodes=*/true));
+    return has_nodes_ ? AddAllPoints(nodes_.TakePoints(), 3, options, cloud)
+                      : reader_.EndError("the file ends; expected \"$Nodes\"");
+  }
+
+ private:
+  absl::Status ReadSections(bool ends_with_nodes) {
     std::string_view line;
     if (!file_.NextLine(line) || line != "$MeshFormat") {
       return reader_.EndError("expected \"$MeshFormat\" at the start of the file");
     }
     absl::Status status = ReadFormat();
-    while (status.ok() && file_.NextLine(line)) {
+    while (status.ok() && !(ends_with_nodes && has_nodes_) && file_.NextLine(line)) {
       if (line.front() != '$') {
         status = reader_.Error(absl::StrCat("expected the start of a section, such as \"$Nodes\", got ", Quote(line)));
       } else if (line == "$PhysicalNames") {
@@ -72,17 +94,9 @@ class MshReader {
         status = file_.SkipTo(absl::StrCat("$End", std::string(line.substr(1))));
       }
     }
-    if (!status.ok()) {
-      return status;
-    }
-    if (!reader_.status().ok() || !has_nodes_ || !has_elements_) {
-      return reader_.EndError(has_nodes_ ? "the file ends; expected \"$Elements\""
-                                         : "the file ends; expected \"$Nodes\"");
-    }
-    return MakeMesh();
+    return status;
   }
 
- private:
   using Section = absl::Status (MshReader::*)();
 
   absl::Status ReadFormat() {
@@ -517,6 +531,10 @@ absl::StatusOr<Mesh> ReadMsh(const std::string& path, const std::string& numbers
   WELLSPACE_ASSIGN_OR_RETURN(InputFile file, InputFile::Open(path));
   LineReader reader(std::move(file));
   return MshReader(reader, numbers).Read();
+}
+
+absl::Status ReadMshPoints(LineReader& reader, const CloudOptions& options, PointCloud& cloud) {
+  return MshReader(reader, /*numbers=*/"").ReadPoints(options, cloud);
 }
 
 }  // namespace wellspace::formats

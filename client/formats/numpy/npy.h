@@ -16,6 +16,8 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "client/formats/cloud.h"
+#include "client/formats/read_cloud.h"
 
 namespace wellspace::formats {
 
@@ -93,6 +95,12 @@ class NpyReader {
   uint64_t taken_ = 0;            // of them
   NpyHeader header_;
 };
+
+// Takes the rows of an array as points.
+//
+// Errors:     those of NpyReader::ReadNumbers; INVALID_ARGUMENT for other columns than `options` want, and for a
+//             coordinate that is not finite and not to be skipped.
+absl::Status ReadPointsOfArray(NpyReader& array, const CloudOptions& options, PointCloud& cloud);
 
 }  // namespace wellspace::formats
 

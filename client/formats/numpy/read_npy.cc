@@ -1,4 +1,4 @@
-// numpy's .npy: a cloud as one array.
+// numpy's .npy: a cloud as one array, also that of an archive.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -41,19 +41,14 @@ absl::StatusOr<std::vector<size_t>> ChooseColumns(const NpyReader& array, const 
 
 }  // namespace
 
-absl::Status ReadNpy(InputFile& file, const CloudOptions& options, PointCloud& cloud) {
-  absl::StatusOr<NpyReader> array = NpyReader::Open(
-      cloud.name, [&file](char* buffer, size_t size) { return file.Read(buffer, size); }, file.size());
-  if (!array.ok()) {
-    return array.status();
-  }
-  WELLSPACE_ASSIGN_OR_RETURN(const std::vector<size_t> columns, ChooseColumns(*array, options, cloud.name));
-  WELLSPACE_RETURN_IF_ERROR(array->ReadNumbers(cloud.points));
-  const uint64_t stride = array->columns();
+absl::Status ReadPointsOfArray(NpyReader& array, const CloudOptions& options, PointCloud& cloud) {
+  WELLSPACE_ASSIGN_OR_RETURN(const std::vector<size_t> columns, ChooseColumns(array, options, cloud.name));
+  WELLSPACE_RETURN_IF_ERROR(array.ReadNumbers(cloud.points));
+  const uint64_t stride = array.columns();
   cloud.dimension = static_cast<int>(columns.size());
   // In place: a point never has more coordinates than its row.
   uint64_t kept = 0;
-  for (uint64_t row = 0; row < array->rows(); ++row) {
+  for (uint64_t row = 0; row < array.rows(); ++row) {
     std::array<double, kMaxDimension> point;
     bool is_invalid = false;
     for (size_t axis = 0; axis < columns.size(); ++axis) {
@@ -78,6 +73,15 @@ absl::Status ReadNpy(InputFile& file, const CloudOptions& options, PointCloud& c
   }
   cloud.points.resize(kept * columns.size());
   return absl::OkStatus();
+}
+
+absl::Status ReadNpy(InputFile& file, const CloudOptions& options, PointCloud& cloud) {
+  absl::StatusOr<NpyReader> array = NpyReader::Open(
+      cloud.name, [&file](char* buffer, size_t size) { return file.Read(buffer, size); }, file.size());
+  if (!array.ok()) {
+    return array.status();
+  }
+  return ReadPointsOfArray(*array, options, cloud);
 }
 
 }  // namespace wellspace::formats

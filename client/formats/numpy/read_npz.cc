@@ -11,6 +11,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/formats/boundary.h"
 #include "client/formats/cloud.h"
+#include "client/formats/cloud_readers.h"
 #include "client/formats/io/input_file.h"
 #include "client/formats/io/line_reader.h"
 #include "client/formats/mesh_readers.h"
@@ -172,6 +173,12 @@ absl::StatusOr<Mesh> ReadNpz(const std::string& path, const std::string& numbers
     WELLSPACE_RETURN_IF_ERROR(ReadBoundary(*archive, name, mesh));
   }
   return mesh;
+}
+
+absl::Status ReadNpzPoints(InputFile& file, const CloudOptions& options, PointCloud& cloud) {
+  WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<ZipReader> archive, ZipReader::Open(std::move(file)));
+  WELLSPACE_ASSIGN_OR_RETURN(NpyReader points, OpenArray(*archive, cloud.name, kNpzPoints));
+  return ReadPointsOfArray(points, options, cloud);
 }
 
 }  // namespace wellspace::formats

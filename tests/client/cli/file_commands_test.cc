@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -74,6 +75,9 @@ TEST_F(FileCommandsTest, ConvertKeepsBoundaryRegionsNamesAndAttributes) {
     EXPECT_EQ(mesh->simplices, first->simplices);
     EXPECT_EQ(mesh->facets, first->facets);
     ASSERT_EQ(mesh->boundary.size(), 4);
+    EXPECT_EQ(mesh->boundary[3].name, "ymax");
+    ASSERT_EQ(mesh->regions.size(), 1);
+    EXPECT_EQ(mesh->regions[0].name, "domain");
     from = to;
   }
   ASSERT_EQ(RunWellspace({"convert", Path("named.msh"), Path("c.npz")}).exit_code, 0);
@@ -151,7 +155,7 @@ TEST_F(FileCommandsTest, ConvertReadsMeshesOfVtkOrTellsWhatItLeavesOut) {
   EXPECT_EQ(quads.exit_code, 0);
   EXPECT_THAT(quads.err, HasSubstr("note: only points are read, since it is no mesh of simplices"));
   const RunResult json = RunWellspace({"convert", Path("b.vtk"), Path("b.vtu"), "--output", "json"});
-  EXPECT_EQ(nlohmann::json::parse(json.out)["notes"].size(), 2);
+  EXPECT_EQ(nlohmann::json::parse(json.out)["notes"].size(), 3);  // also that they are in the plane
   // What the other format has no place for.
   Mesh(kMeasured, "measured.vtu");
   const RunResult su2 = RunWellspace({"convert", Path("measured.vtu"), Path("measured.msh")});
@@ -170,6 +174,37 @@ TEST_F(FileCommandsTest, ConvertMakesVerticesOfPoints) {
   EXPECT_EQ(cloud->attributes[1], (formats::PointAttribute{"id", {7, 8, 9, 10, 11, 12}}));
   ASSERT_EQ(RunWellspace({"convert", Path("a.csv"), Path("b.vtu"), "--no-attributes"}).exit_code, 0);
   EXPECT_THAT(folder_.Read("b.vtu"), Not(HasSubstr("\"id\"")));
+}
+
+// A mesh of the plane is a file of points of the plane, whatever its format is, for each command that takes points.
+TEST_F(FileCommandsTest, MeshesAreInputsOfPoints) {
+  Mesh(kPlane, "a.vtu", {"--size", "0.3"});
+  const absl::StatusOr<formats::Mesh> first = formats::ReadMesh(Path("a.vtu"));
+  ASSERT_TRUE(first.ok());
+  for (const char* name : {"a.vtu", "b.vtk", "b.msh", "b.mesh", "b.npz", "b.node"}) {
+    SCOPED_TRACE(name);
+    if (name[0] == 'b') {
+      ASSERT_EQ(RunWellspace({"convert", Path("a.vtu"), Path(name)}).exit_code, 0);
+    }
+    const RunResult meshed = RunWellspace({"mesh", Path(name), "-o", Path("out.npz"), "--margin", "0.1"});
+    ASSERT_EQ(meshed.exit_code, 0) << meshed.err;
+    const absl::StatusOr<formats::Mesh> mesh = formats::ReadMesh(Path("out.npz"));
+    ASSERT_TRUE(mesh.ok());
+    ASSERT_EQ(mesh->dimension, 2);
+    ASSERT_GE(mesh->points.size(), first->points.size());
+    EXPECT_TRUE(std::equal(first->points.begin(), first->points.end(), mesh->points.begin()));
+    const RunResult check = RunWellspace({"check", Path("out.npz"), "--cloud", Path(name)});
+    EXPECT_EQ(check.exit_code, 0) << check.out << check.err;
+    EXPECT_EQ(RunWellspace({"estimate", Path(name)}).exit_code, 0);
+  }
+  folder_.Write("quads.msh",
+                "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n$EndNodes\n"
+                "$Elements\n1\n1 3 2 0 1 1 2 3 4\n$EndElements\n");
+  EXPECT_EQ(RunWellspace({"mesh", Path("quads.msh"), "-o", Path("out.vtu")}).exit_code, 0);
+  const RunResult info = RunWellspace({"info", Path("quads.msh")});
+  EXPECT_EQ(info.exit_code, 2);
+  EXPECT_THAT(info.err, HasSubstr("got type 3; --input-format msh reads the points alone"));
+  EXPECT_EQ(Info("quads.msh", {"--input-format", "msh"})["points"], 4);
 }
 
 TEST_F(FileCommandsTest, InfoOfAMesh) {

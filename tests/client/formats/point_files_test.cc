@@ -457,5 +457,66 @@ TEST_F(PointFilesTest, VtpAndVtu) {
   ExpectCutAnywhereIsNoTrouble("a.vtp", kVtp);
 }
 
+// Points of meshes, whatever their elements are.
+constexpr char kMsh[] =
+    "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n2 7 \"sea\"\n$EndPhysicalNames\n"
+    "$Nodes\n4\n3 0 0 0\n9 1 0 0.5\n1 1 1 0\n2 0 1 0\n$EndNodes\n$Elements\n1\n1 3 2 7 1 3 9 1 2\n$EndElements\n";
+constexpr char kMedit[] =
+    "MeshVersionFormatted 2\nDimension 3 # of space\nVertices 4\n0 0 0 1  1 0 0.5 1\n1 1 0 0\n0 1 0 0\n"
+    "Quadrilaterals 1\n1 2 3 4 7\nEnd\n";
+
+TEST_F(PointFilesTest, MshAndMeditAreReadAsPoints) {
+  for (const auto& [name, text] : {std::pair("a.msh", kMsh), std::pair("a.mesh", kMedit)}) {
+    SCOPED_TRACE(name);
+    const PointCloud cloud = ReadGood(name, text);
+    EXPECT_EQ(cloud.dimension, 3);
+    EXPECT_THAT(cloud.points, ElementsAre(0, 0, 0, 1, 0, 0.5, 1, 1, 0, 0, 1, 0));
+    EXPECT_THAT(cloud.notes, IsEmpty());
+    EXPECT_THAT(cloud.Origin(3), EndsWith(name + "[3]"s));
+    EXPECT_THAT(ReadGood(name, text, {.columns = {"z", "x"}}).points, ElementsAre(0, 0, 0.5, 1, 0, 1, 0, 0));
+    EXPECT_EQ(ReadBad(name, text, {.dimension = 2}),
+              name + ": expected 2 coordinates, got 3; --columns x,y takes 2 of them"s);
+    EXPECT_THAT(ReadBad(name, Replaced(text, "0.5", "nan")), HasSubstr("expected a finite number, got \"nan\""));
+    const PointCloud skipped =
+        ReadGood(name, Replaced(Replaced(text, "0.5", "nan"), "0 1 0", "0 1 7"), {.skip_invalid = true});
+    EXPECT_THAT(skipped.points, ElementsAre(0, 0, 0, 1, 1, 0, 0, 1, 7));
+    EXPECT_EQ(skipped.skipped, 1);
+    EXPECT_THAT(skipped.Origin(2), EndsWith(name + "[3]"s));
+    EXPECT_THAT(ReadBad(name, Replaced(text, "0.5", "half"), {.skip_invalid = true}),
+                HasSubstr("expected a number, got \"half\""));
+    ExpectCutAnywhereIsNoTrouble(name, text);
+  }
+  EXPECT_EQ(ReadBad("a.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"), "a.msh:3: the file ends; expected \"$Nodes\"");
+  EXPECT_EQ(ReadBad("a.mesh", "MeshVersionFormatted 2\nDimension 3\nEnd\n"),
+            "a.mesh:3: the file ends; expected Vertices");
+  EXPECT_THAT(ReadGood("b.mesh", "MeshVersionFormatted 1 Dimension 2 Vertices 1 0.5 2 7").points, ElementsAre(0.5, 2));
+}
+
+// Formats with three coordinates in the plane, too: z = 0 everywhere is no third dimension, unless it is asked for.
+TEST_F(PointFilesTest, PaddedPointsAreInThePlane) {
+  const std::string flat = Replaced(kMsh, "0.5", "0");
+  const PointCloud plane = ReadGood("a.msh", flat);
+  EXPECT_EQ(plane.dimension, 2);
+  EXPECT_THAT(plane.points, ElementsAre(0, 0, 1, 0, 1, 1, 0, 1));
+  EXPECT_THAT(plane.notes, ElementsAre(EndsWith(
+                               "a.msh: all points have z = 0, and are taken in the plane; --columns x,y,z takes them "
+                               "in space")));
+  const PointCloud wanted = ReadGood("a.msh", flat, {.dimension = 2});
+  EXPECT_EQ(wanted.points, plane.points);
+  EXPECT_THAT(wanted.notes, IsEmpty());
+  EXPECT_EQ(ReadGood("a.msh", flat, {.dimension = 3}).dimension, 3);
+  EXPECT_EQ(ReadGood("a.msh", flat, {.columns = {"x", "y", "z"}}).dimension, 3);
+  const PointCloud legacy = ReadGood(
+      "a.vtk", "# vtk DataFile Version 3.0\nt\nASCII\nDATASET POLYDATA\nPOINTS 4 float\n0 0 0 1 0 0 0 1 0 1 1 0\n");
+  EXPECT_THAT(legacy.points, ElementsAre(0, 0, 1, 0, 0, 1, 1, 1));
+  // Elsewhere somebody has written it.
+  const PointCloud table = ReadGood("a.csv", "0,0,7\n1,0,7\n1,1,7\n0,1,7\n");
+  EXPECT_EQ(table.dimension, 3);
+  EXPECT_THAT(table.notes, ElementsAre(EndsWith(
+                               "a.csv: all points have z = 7, and are taken in space; --columns x,y takes them in the "
+                               "plane")));
+  EXPECT_THAT(ReadGood("a.csv", "0,0,7\n1,0,7\n1,1,7\n0,1,6\n").notes, IsEmpty());
+}
+
 }  // namespace
 }  // namespace wellspace::formats

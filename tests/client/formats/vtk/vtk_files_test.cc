@@ -287,14 +287,16 @@ TEST_F(VtkFilesTest, CellsThatAreNotReadAreToldOf) {
   const MeshOrCloud legacy = ReadEither("a.vtk");
   EXPECT_FALSE(legacy.is_mesh);
   EXPECT_THAT(legacy.notes, ElementsAre(HasSubstr("only points are read, since it is no mesh of simplices: "),
-                                        HasSubstr("1 cell is not used, only the points")));
+                                        HasSubstr("1 cell is not used, only the points"),
+                                        HasSubstr("all points have z = 0, and are taken in the plane")));
   const std::string polygons =
       "<VTKFile type=\"PolyData\"><PolyData><Piece NumberOfPoints=\"4\" NumberOfPolys=\"1\"><Points><DataArray "
       "type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">0 0 0 1 0 0 1 1 0 0 1 0</DataArray></Points><Polys>"
       "<DataArray type=\"Int64\" Name=\"connectivity\" format=\"ascii\">0 1 2 3</DataArray><DataArray type=\"Int64\" "
       "Name=\"offsets\" format=\"ascii\">4</DataArray></Polys></Piece></PolyData></VTKFile>";
   folder_.Write("a.vtp", polygons);
-  EXPECT_THAT(ReadEither("a.vtp").notes, ElementsAre(HasSubstr("got type 7"), HasSubstr("1 cell is not used")));
+  EXPECT_THAT(ReadEither("a.vtp").notes,
+              ElementsAre(HasSubstr("got type 7"), HasSubstr("1 cell is not used"), HasSubstr("in the plane")));
   std::string triangle = polygons;
   triangle.replace(triangle.find("0 1 2 3<"), 8, "0 1 2<");
   triangle.replace(triangle.find(">4<"), 3, ">3<");
