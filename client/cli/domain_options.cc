@@ -63,7 +63,7 @@ void DomainOptions::AddReadingTo(CLI::App& command, const std::string& what) {
       "--segments", has_segments_,
       absl::StrCat(what,
                    " is a domain in 2-D: lines of .obj, or polylines of .csv, become edges of the mesh. Files of "
-                   ".poly and .geojson always have segments"));
+                   ".poly, .geojson, .geojsonl, .wkt and .shp always have segments"));
   command
       .add_option("--faces", faces_,
                   "Which faces, into which segments cut the plane, are meshed: box, all in the box; holes, all bounded "
@@ -94,7 +94,7 @@ void DomainOptions::AddTo(CLI::App& command) {
 }
 
 bool DomainOptions::IsDomain(const std::string& path, const std::string& format) const {
-  return has_segments_ || (format.empty() ? formats::IsDomainPath(path) : format == "poly" || format == "geojson");
+  return has_segments_ || (format.empty() ? formats::IsDomainPath(path) : formats::IsDomainFormat(format));
 }
 
 absl::Status DomainOptions::CheckCloud(const std::string& cloud) const {
@@ -106,7 +106,8 @@ absl::Status DomainOptions::CheckCloud(const std::string& cloud) const {
                                                                  : nullptr;
   return option == nullptr ? absl::OkStatus()
                            : absl::InvalidArgumentError(absl::StrCat(
-                                 option, ": ", cloud, " has points alone; give a .poly or .geojson, or --segments"));
+                                 option, ": ", cloud,
+                                 " has points alone; give a domain, such as a .poly or .geojson, or --segments"));
 }
 
 absl::StatusOr<formats::PointCloud> DomainOptions::Read(const std::string& path, const formats::CloudOptions& options) {

@@ -3,6 +3,7 @@
 #include <iostream>
 
 #include "client/cli/helpful_threads.h"
+#include "client/formats/domain/read_planar_domain.h"
 #include "client/formats/io/input_file.h"
 #include "client/formats/io/line_reader.h"
 #include "client/formats/io/output_file.h"
@@ -17,8 +18,8 @@ const char kCloudsHelp[] =
     "         lon, lat and the like), .xyz, .asc, .pts, .node, .npy, .pcd, .las, vertices of .ply, .obj, .off, .stl,\n"
     "         .vtk, .vtp, .vtu, .msh, .mesh and .npz; each but .npz may be compressed (.csv.gz); \"-\" is standard\n"
     "         input (csv, or --input-format)\n"
-    "Domains: in 2-D, .poly (Triangle's, with .node) and .geojson; with --segments lines of .obj and polylines of "
-    ".csv\n";
+    "Domains: in 2-D, .poly (Triangle's, with .node), .geojson, .geojsonl, .ndjson, .wkt and .shp; with --segments\n"
+    "         lines of .obj and polylines of .csv\n";
 
 const char kMeshesHelp[] =
     "Meshes:  .vtu, .vtkhdf, .vtk, .xdmf (with .h5), .msh (Gmsh 4.1; --format msh22: 2.2), .mesh (MEDIT), .su2 and\n"
@@ -54,7 +55,7 @@ void MeshingOptions::AddTo(CLI::App& command) {
   remote_.AddTo(command, RemoteCommand::Needs::kAnyServer);
   command.add_option("--stats", statistics_, "Write figures as JSON to this file, or - for standard output")
       ->type_name("FILE");
-  AddCloudOptions(command, cloud_options_, "IN", {"poly", "geojson"});
+  AddCloudOptions(command, cloud_options_, "IN", formats::DomainOnlyFormats());
   domain_.AddTo(command);
   size_field_.AddTo(command);
 }

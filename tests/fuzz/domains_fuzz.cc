@@ -35,6 +35,10 @@ constexpr std::array kChoices = {
     Choice{"obj"},
     Choice{"csv"},
     Choice{"csv", false, false, true},
+    // From '7' on.
+    Choice{"geojsonl", false, true},
+    Choice{"wkt"},
+    Choice{"shp"},
 };
 
 bool AreSameBits(const std::vector<double>& a, const std::vector<double>& b) {

@@ -342,7 +342,7 @@ absl::Status CheckCommand::CheckOptionsOfDomain() const {
   if (!cloud_path.empty() && !IsCloudADomain()) {
     return absl::InvalidArgumentError(absl::StrCat(
         "--cloud ", cloud_path,
-        ": the mesh is one of a domain with segments; give the domain, a .poly or .geojson, or --segments"));
+        ": the mesh is one of a domain with segments; give the domain, such as a .poly or .geojson, or --segments"));
   }
   if (!domain_box.empty() &&
       (domain_box.size() != 4 || !(domain_box[0] < domain_box[2]) || !(domain_box[1] < domain_box[3]))) {
@@ -458,14 +458,15 @@ void AddCheckCommand(CLI::App& app, int& exit_code) {
   check->footer(kExitCodesHelp);
   AddMeshInput(*check, command->mesh_path);
   check
-      ->add_option("--cloud", command->cloud_path,
-                   "File of points that must be the first vertices, to the bit; or a domain, a .poly or .geojson or "
-                   "with --segments, that the mesh must be of, with its faces, regions, largest areas and tags")
+      ->add_option(
+          "--cloud", command->cloud_path,
+          "File of points that must be the first vertices, to the bit; or a domain, such as a .poly or .geojson or "
+          "with --segments, that the mesh must be of, with its faces, regions, largest areas and tags")
       ->type_name("FILE");
   AddNumber(*check, "--merge", command->merge_distance,
             "Points of --cloud no farther than this from a vertex that is one of them need not be vertices")
       ->needs("--cloud");
-  AddCloudOptions(*check, command->cloud_options, "the cloud", {"poly", "geojson"});
+  AddCloudOptions(*check, command->cloud_options, "the cloud", formats::DomainOnlyFormats());
   command->domain_options.AddReadingTo(*check, "The cloud");
   AddNumbers(*check, "--domain", command->domain_box,
              "Box that lines are in, low corner then high corner; default: that of the mesh")

@@ -18,6 +18,7 @@
 #include "client/cli/statistics.h"
 #include "client/files/cloud_file.h"
 #include "client/files/mesh_file.h"
+#include "client/formats/domain/read_planar_domain.h"
 #include "client/formats/file_plan.h"
 #include "client/formats/io/input_file.h"
 #include "client/formats/io/line_reader.h"
@@ -71,8 +72,9 @@ absl::Status UploadCommand::CheckOptions() const {
     return absl::OkStatus();
   }
   if (segment_offset.has_value() || seed_offset.has_value()) {
-    return absl::InvalidArgumentError(absl::StrCat(segment_offset.has_value() ? "--segment-offset" : "--seed-offset",
-                                                   ": IN has points alone; give a .poly or .geojson, or --segments"));
+    return absl::InvalidArgumentError(
+        absl::StrCat(segment_offset.has_value() ? "--segment-offset" : "--seed-offset",
+                     ": IN has points alone; give a domain, such as a .poly or .geojson, or --segments"));
   }
   return domain.CheckCloud();
 }
@@ -244,7 +246,7 @@ void AddUpload(CLI::App& app, int& exit_code) {
   upload->add_option("IN", command->input, "File of points or of a domain, or - for standard input")
       ->required()
       ->type_name("FILE");
-  AddCloudOptions(*upload, command->cloud_options, "IN", {"poly", "geojson"});
+  AddCloudOptions(*upload, command->cloud_options, "IN", formats::DomainOnlyFormats());
   command->domain.AddTo(*upload);
   AddCount(
       *upload, "--offset", [command](uint64_t offset) { command->offset = offset; },

@@ -16,6 +16,9 @@ namespace wellspace::formats {
 // `path` is that of the file: the one with the points may be beside it.
 absl::Status ReadPoly(InputFile& file, const std::string& path, PlanarDomain& domain);
 absl::Status ReadGeoJson(InputFile& file, const DomainOptions& options, PlanarDomain& domain);
+absl::Status ReadGeoJsonLines(InputFile& file, const DomainOptions& options, PlanarDomain& domain);
+absl::Status ReadWkt(InputFile& file, const DomainOptions& options, PlanarDomain& domain);
+absl::Status ReadShapefile(InputFile& file, const DomainOptions& options, PlanarDomain& domain);
 absl::Status ReadObjLines(InputFile& file, PlanarDomain& domain);
 absl::Status ReadPolylines(InputFile& file, const DomainOptions& options, PlanarDomain& domain);
 

@@ -126,7 +126,15 @@ void GeoJsonFeatures::NoteWidth() const {
   }
 }
 
-void GeoJsonFeatures::Note() const {
+void GeoJsonFeatures::Finish() {
+  domain_.markers.resize(domain_.segment_count());
+  const auto has = [this](uint8_t value) {
+    return std::find(domain_.is_line.begin(), domain_.is_line.end(), value) != domain_.is_line.end();
+  };
+  if (!has(0) || !has(1)) {
+    domain_.is_line.clear();
+  }
+  domain_.segment_lines = {};  // places say where segments are
   NoteFeatures();
   NoteWidth();
 }

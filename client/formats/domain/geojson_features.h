@@ -1,5 +1,5 @@
-// What becomes of the features of a GeoJSON file: of their properties markers and regions, and of all what is noted of
-// the file. Private to read_geojson.cc.
+// What becomes of the features of a file of geometries: of the properties of GeoJSON's markers and regions, and of all
+// what is noted of the file. Private to the readers of such files.
 #ifndef WELLSPACE_CLIENT_FORMATS_DOMAIN_GEOJSON_FEATURES_H_
 #define WELLSPACE_CLIENT_FORMATS_DOMAIN_GEOJSON_FEATURES_H_
 
@@ -31,8 +31,8 @@ class GeoJsonFeatures {
   // Gives what the domain has got of a feature, which ends, its marker, and its polygons their region.
   void End(const GeoJsonLevel& feature);
 
-  // Notes what there is to say of the file, once it is read.
-  void Note() const;
+  // Completes the domain once the file is read, and notes what there is to say of it.
+  void Finish();
 
  private:
   void AddRegions(const GeoJsonLevel& feature);

@@ -1,4 +1,4 @@
-// The coordinates of a geometry of GeoJSON. Private to this folder.
+// The coordinates of a geometry of GeoJSON, or of another format with the same ones. Private to this folder.
 #ifndef WELLSPACE_CLIENT_FORMATS_DOMAIN_GEOJSON_GEOMETRY_H_
 #define WELLSPACE_CLIENT_FORMATS_DOMAIN_GEOJSON_GEOMETRY_H_
 

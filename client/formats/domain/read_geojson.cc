@@ -1,4 +1,4 @@
-// GeoJSON, RFC 7946, as its parser comes to each value.
+// GeoJSON, RFC 7946, as its parser comes to each value; and sequences of its texts, RFC 8142.
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -18,6 +18,7 @@
 #include "client/formats/domain/json_source.h"
 #include "client/formats/io/input_file.h"
 #include "client/formats/io/number.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
@@ -48,8 +49,9 @@ bool IsLikeNan(std::string_view token) {
 // What the parser calls; true goes on, false ends it, and status() says why.
 class GeoJsonReader {
  public:
-  GeoJsonReader(JsonSource& source, const DomainOptions& options, PlanarDomain& domain)
-      : source_(source), domain_(domain), features_(options, domain) {}
+  // `is_sequence`: the file is one of texts, of which each is a feature by itself.
+  GeoJsonReader(JsonSource& source, const DomainOptions& options, bool is_sequence, PlanarDomain& domain)
+      : source_(source), is_sequence_(is_sequence), domain_(domain), features_(options, domain) {}
 
   bool null() { return Scalar("null", nullptr); }
   bool boolean(bool value) { return Scalar(value ? "true" : "false", nullptr); }
@@ -70,7 +72,7 @@ class GeoJsonReader {
 
   const absl::Status& status() const { return status_; }
   // To be called at the end of the file.
-  void Finish();
+  void Finish() { features_.Finish(); }
 
  private:
   bool Number(double value);
@@ -95,6 +97,7 @@ class GeoJsonReader {
   bool FailKind(std::string_view got);
 
   JsonSource& source_;
+  const bool is_sequence_;
   PlanarDomain& domain_;
   absl::Status status_;
   std::vector<Level> levels_;
@@ -253,7 +256,10 @@ bool GeoJsonReader::start_object(size_t /*elements*/) {
     return FailNesting();
   }
   if (levels_.empty()) {
-    levels_.push_back({.kind = Level::kObject, .line = source_.line()});
+    levels_.push_back({.kind = Level::kObject,
+                       .line = source_.line(),
+                       .first_segment = domain_.segment_count(),
+                       .first_place = domain_.places.size()});
     return true;
   }
   return StartObjectIn(levels_.back());
@@ -382,10 +388,11 @@ bool GeoJsonReader::EndGeoJsonObject() {
     return FailAt(object.line, wrong);
   }
   levels_.pop_back();
-  if (object.type < kGeoJsonGeometryTypes) {
-    return EndGeometry(object);
+  if (object.type < kGeoJsonGeometryTypes && !EndGeometry(object)) {
+    return false;
   }
-  if (object.type == kFeature) {
+  const bool is_text_of_geometry = is_sequence_ && levels_.empty() && object.type < kFeature;
+  if (object.type == kFeature || is_text_of_geometry) {
     features_.End(object);
   }
   return true;
@@ -421,23 +428,11 @@ bool GeoJsonReader::parse_error(size_t /*position*/, const std::string& last_tok
                            IsLikeNan(last_token) ? " (JSON has neither NaN nor infinities)" : ""));
 }
 
-void GeoJsonReader::Finish() {
-  domain_.markers.resize(domain_.segment_count());
-  const auto has = [this](uint8_t value) {
-    return std::find(domain_.is_line.begin(), domain_.is_line.end(), value) != domain_.is_line.end();
-  };
-  if (!has(0) || !has(1)) {
-    domain_.is_line.clear();
-  }
-  domain_.segment_lines = {};  // places say where segments are
-  features_.Note();
-}
-
 }  // namespace
 
 absl::Status ReadGeoJson(InputFile& file, const DomainOptions& options, PlanarDomain& domain) {
   JsonSource source(file);
-  GeoJsonReader reader(source, options, domain);
+  GeoJsonReader reader(source, options, /*is_sequence=*/false, domain);
   const bool is_parsed = json::sax_parse(source.begin(), source.end(), &reader);
   if (!source.status().ok()) {
     return source.status();
@@ -448,6 +443,27 @@ absl::Status ReadGeoJson(InputFile& file, const DomainOptions& options, PlanarDo
   if (!source.IsAtEnd()) {  // the parser takes a byte 0 for the end
     return LineError(domain.name, source.line(), "expected the end of the file, got a byte 0");
   }
+  reader.Finish();
+  return absl::OkStatus();
+}
+
+absl::Status ReadGeoJsonLines(InputFile& file, const DomainOptions& options, PlanarDomain& domain) {
+  // What may stand between texts; the last is the separator of RFC 8142.
+  constexpr std::string_view kBetween = " \t\r\n\x1e";
+  JsonSource source(file);
+  GeoJsonReader reader(source, options, /*is_sequence=*/true, domain);
+  while (!source.IsAtEnd()) {
+    if (JsonSource::Iterator at = source.begin(); kBetween.find(*at) != std::string_view::npos) {
+      ++at;
+      continue;
+    }
+    const bool is_parsed =
+        json::sax_parse(source.begin(), source.end(), &reader, json::input_format_t::json, /*strict=*/false);
+    if (source.status().ok() && !is_parsed) {
+      return reader.status();
+    }
+  }
+  WELLSPACE_RETURN_IF_ERROR(source.status());
   reader.Finish();
   return absl::OkStatus();
 }

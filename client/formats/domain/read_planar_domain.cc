@@ -1,5 +1,6 @@
 #include "client/formats/domain/read_planar_domain.h"
 
+#include <algorithm>
 #include <span>
 
 #include "absl/strings/str_cat.h"
@@ -12,12 +13,15 @@
 namespace wellspace::formats {
 namespace {
 
-enum class Kind { kPoly, kGeoJson, kObj, kCsv };
+enum class Kind { kPoly, kGeoJson, kGeoJsonLines, kWkt, kShapefile, kObj, kCsv };
 
 std::span<const Format<Kind>> Kinds() {
   static const std::vector<Format<Kind>> kinds = {
       {"poly", {".poly"}, Kind::kPoly},
       {"geojson", {".geojson", ".json"}, Kind::kGeoJson},
+      {"geojsonl", {".geojsonl", ".geojsons", ".ndjson"}, Kind::kGeoJsonLines},
+      {"wkt", {".wkt"}, Kind::kWkt},
+      {"shp", {".shp"}, Kind::kShapefile},
       {"obj", {".obj"}, Kind::kObj},
       {"csv", {".csv", ".tsv", ".txt", ".dat"}, Kind::kCsv},
   };
@@ -29,10 +33,11 @@ absl::Status CheckOptions(const std::string& path, Kind kind, const DomainOption
     return absl::InvalidArgumentError(
         absl::StrCat(path, ": ", option, " is of the format ", format, "; expected none of another one"));
   };
-  if (kind != Kind::kGeoJson && !options.region_property.empty()) {
+  const bool has_properties = kind == Kind::kGeoJson || kind == Kind::kGeoJsonLines;
+  if (!has_properties && !options.region_property.empty()) {
     return error("--region-property", "geojson");
   }
-  if (kind != Kind::kGeoJson && !options.marker_property.empty()) {
+  if (!has_properties && !options.marker_property.empty()) {
     return error("--marker-property", "geojson");
   }
   if (kind != Kind::kCsv && !options.columns.empty()) {
@@ -51,6 +56,12 @@ absl::Status Read(InputFile& file, const std::string& path, Kind kind, const Dom
       return ReadPoly(file, path, domain);
     case Kind::kGeoJson:
       return ReadGeoJson(file, options, domain);
+    case Kind::kGeoJsonLines:
+      return ReadGeoJsonLines(file, options, domain);
+    case Kind::kWkt:
+      return ReadWkt(file, options, domain);
+    case Kind::kShapefile:
+      return ReadShapefile(file, options, domain);
     case Kind::kObj:
       return ReadObjLines(file, domain);
     case Kind::kCsv:
@@ -78,8 +89,17 @@ void NoteChanges(PlanarDomain& domain) {
 std::vector<std::string> DomainFormats() { return FormatNames(Kinds()); }
 
 bool IsDomainPath(const std::string& path) {
+  // .json may be anything, and the others are of clouds as well.
   const std::string extension = ExtensionOf(WithoutGzip(path));
-  return extension == ".poly" || extension == ".geojson";
+  const auto row = FindInputFormat(Kinds(), path, "");
+  return extension != ".json" && row.ok() && IsDomainFormat((*row)->name);
+}
+
+std::vector<std::string> DomainOnlyFormats() { return {"poly", "geojson", "geojsonl", "wkt", "shp"}; }
+
+bool IsDomainFormat(const std::string& format) {
+  const std::vector<std::string> formats = DomainOnlyFormats();
+  return std::find(formats.begin(), formats.end(), format) != formats.end();
 }
 
 absl::StatusOr<PlanarDomain> ReadPlanarDomain(const std::string& path, const DomainOptions& options) {

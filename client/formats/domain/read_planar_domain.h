@@ -11,6 +11,13 @@
 //            are taken as those of a plane, altitudes and members that the format does not know are skipped. Two
 //            positions that are equal are two points, but for those that follow each other in a ring or a line, and for
 //            the last of a ring or a closed line. Faces: kEvenOdd; without a polygon kBox.
+//   geojsonl Texts of geojson, one after the other, in lines of their own or not; the separator of RFC 8142 may stand
+//            before each. Each is a Feature or a geometry, or what a file of geojson may be. A geometry is a feature.
+//   wkt      Well-known text of geometries, one after the other, separated by blanks, line ends or semicolons: POINT,
+//            LINESTRING, POLYGON, MULTIPOINT and so on, TRIANGLE, GEOMETRYCOLLECTION, EMPTY ones too, in any case, with
+//            Z, M or ZM and an "SRID=…;" before them or not. As the features of a file of geojson.
+//   shp      ESRI's shapefile, without the files beside it: points, polylines and polygons, with Z and M or not. Each
+//            record is as a feature of geojson, rings in any order; null shapes are counted.
 //   obj      Wavefront's: all vertices ("v") become points, and lines ("l") segments, with indices from 1 or, negative,
 //            from the last vertex back. A third coordinate has to be the same in all. Faces ("f") are skipped. Faces
 //            of the domain: kBox.
@@ -48,7 +55,11 @@ struct DomainOptions {
 // The names that DomainOptions::format may take.
 std::vector<std::string> DomainFormats();
 
-// Whether the extension of `path` says that it has a planar domain and no cloud: .poly or .geojson, also with .gz.
+// Those of them whose files have a planar domain and no cloud: all but obj and csv.
+std::vector<std::string> DomainOnlyFormats();
+bool IsDomainFormat(const std::string& format);
+
+// Whether the extension of `path` says that it is of such a format: .poly, .geojson and so on, also with .gz.
 bool IsDomainPath(const std::string& path);
 
 // Reads the domain of `path`; "-" is standard input. Nothing is cleaned but what PlanarDomain counts.

@@ -136,6 +136,28 @@ std::string FeaturesText(const std::vector<std::string>& features) {
   return absl::StrCat(R"({"type": "FeatureCollection", "features": [)", absl::StrJoin(features, ","), "]}");
 }
 
+// The same rings in another format are the same domain.
+TEST_F(DomainCommandsTest, OtherFormatsOfRingsMakeTheMeshOfGeoJson) {
+  const std::string polygon = R"({"type":"Polygon","coordinates":[[[0,0],[9,0],[9,9],[0,9],[0,0]],)"
+                              R"([[3,3],[6,3],[6,6],[3,6],[3,3]]]})";
+  const std::string json = folder_.Write("a.geojson", polygon);
+  ASSERT_EQ(RunWellspace({"mesh", json, "-o", Path("json.npz"), "--size", "1"}).exit_code, 0);
+  folder_.Write("a.ndjson", polygon + "\n");
+  folder_.Write("a.wkt", "POLYGON((0 0,9 0,9 9,0 9,0 0),(3 3,6 3,6 6,3 6,3 3))\n");
+  for (const char* name : {"a.ndjson", "a.wkt"}) {
+    SCOPED_TRACE(name);
+    const RunResult result = RunWellspace({"mesh", Path(name), "-o", Path("other.npz"), "--size", "1"});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_EQ(folder_.Read("other.npz"), folder_.Read("json.npz"));
+    const RunResult check = RunWellspace({"check", Path("json.npz"), "--cloud", Path(name)});
+    EXPECT_EQ(check.exit_code, 0) << check.out << check.err;
+  }
+  EXPECT_EQ(RunWellspace({"mesh", "-", "--input-format", "wkt", "-o", Path("in.npz"), "--size", "1"},
+                         {.input = folder_.Read("a.wkt"), .environment = {}})
+                .exit_code,
+            0);
+}
+
 TEST_F(DomainCommandsTest, CheckTakesEachStretchOfASegmentByItself) {
   Mesh("notch.geojson", R"({"type": "Polygon", "coordinates":
       [[[0, 0], [10, 0], [10, 10], [0, 10], [0, 0]], [[0, 1], [3, 2], [0, 3], [0, 1]]]})");

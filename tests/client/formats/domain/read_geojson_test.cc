@@ -7,6 +7,7 @@
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -389,6 +390,41 @@ TEST_F(ReadGeoJsonTest, ACutArchiveIsRefused) {
   for (const size_t size : {bytes.size() / 2, bytes.size() - 5}) {
     EXPECT_THAT(ReadBad("a.geojson.gz", bytes.substr(0, size)), StartsWith("a.geojson.gz: ")) << size;
   }
+}
+
+// RFC 8142, and lines as ogr2ogr and jq write them.
+TEST_F(ReadGeoJsonTest, TextsOneAfterTheOther) {
+  const std::string first = Feature(Geometry("Polygon", "[" + Square(0, 0, 4) + "]"), R"({"a":7,"b":3})");
+  const std::string second = Feature(Geometry("Polygon", "[" + Square(5, 0, 1) + "]"), R"({"a":8})");
+  const std::string third = Geometry("LineString", "[[9,9],[10,9]]");
+  const DomainOptions options = {.region_property = "a", .marker_property = "b"};
+  const PlanarDomain together = ReadGood("a.geojson", Features({first, second, Feature(third)}), options);
+  for (const auto& [name, text] :
+       {std::pair<std::string, std::string>("a.geojsonl", absl::StrCat(first, "\n", second, "\n\n", third)),
+        {"a.ndjson", absl::StrCat(first, "\r\n", second, "\r\n", third, "\r\n")},
+        {"a.geojsons", absl::StrCat("\x1e", first, "\n\x1e", second, "\n\x1e", third, "\n")},
+        {"b.ndjson", absl::StrCat(first, second, third)}}) {
+    SCOPED_TRACE(name);
+    const PlanarDomain domain = ReadGood(name, text, options);
+    EXPECT_EQ(domain.points, together.points);
+    EXPECT_EQ(domain.segments, together.segments);
+    EXPECT_EQ(domain.markers, together.markers);
+    EXPECT_EQ(domain.is_line, together.is_line);
+    EXPECT_EQ(domain.seeds, together.seeds);
+    EXPECT_EQ(domain.faces, together.faces);
+  }
+  const PlanarDomain lines = ReadGood("a.geojsonl", absl::StrCat(first, "\n", second, "\n"));
+  EXPECT_EQ(Point(lines, 6), "a.geojsonl:2: geometry.coordinates[0][2]");
+  EXPECT_EQ(Without(lines.SegmentOrigin(7)), "a.geojsonl:2: geometry.coordinates[0][3]");
+  EXPECT_THAT(ReadGood("a.geojsonl", Features({first, second})).points, SizeIs(16));
+  EXPECT_THAT(ReadBad("a.geojsonl", first + "\n" + Geometry("Circle", "[]")),
+              StartsWith("a.geojsonl:2: type: expected Point"));
+  EXPECT_THAT(ReadBad("a.geojsonl", first + "\n[1]"),
+              StartsWith("a.geojsonl:2: expected an object of GeoJSON, got an array"));
+  EXPECT_THAT(ReadBad("a.geojsonl", first + "\n{\"type\":"), StartsWith("a.geojsonl:2: type: expected JSON: "));
+  EXPECT_THAT(ReadBad("a.geojsonl", first + std::string(1, '\0')), StartsWith("a.geojsonl:1: expected JSON: "));
+  EXPECT_THAT(ReadBad("a.geojsonl", "\n\x1e\n"), StartsWith("a.geojsonl: no points"));
+  EXPECT_THAT(ReadBad("a.geojson", first + "\n" + second), StartsWith("a.geojson:2: expected JSON: "));
 }
 
 }  // namespace
