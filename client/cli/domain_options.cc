@@ -59,11 +59,11 @@ absl::StatusOr<client::Features> FeaturesOf(const formats::PlanarDomain& domain,
 }  // namespace
 
 void DomainOptions::AddReadingTo(CLI::App& command, const std::string& what) {
-  command.add_flag(
-      "--segments", has_segments_,
-      absl::StrCat(what,
-                   " is a domain in 2-D: lines of .obj, or polylines of .csv, become edges of the mesh. Files of "
-                   ".poly, .geojson, .geojsonl, .wkt and .shp always have segments"));
+  command.add_flag("--segments", has_segments_,
+                   absl::StrCat(what,
+                                " is a domain in 2-D: lines of .obj, polylines of .csv, or boundaries of .14 become "
+                                "edges of the mesh. Files of .poly, .geojson, .geojsonl, .wkt and .shp always have "
+                                "segments"));
   command
       .add_option("--faces", faces_,
                   "Which faces, into which segments cut the plane, are meshed: box, all in the box; holes, all bounded "

@@ -16,14 +16,15 @@ namespace wellspace::cli {
 const char kCloudsHelp[] =
     "Clouds:  .csv .tsv .txt .dat (columns separated by commas, semicolons or blanks; a header may name x, y, z, or\n"
     "         lon, lat and the like), .xyz, .asc, .pts, .node, .npy, .pcd, .las, vertices of .ply, .obj, .off, .stl,\n"
-    "         .vtk, .vtp, .vtu, .msh, .mesh and .npz; each but .npz may be compressed (.csv.gz); \"-\" is standard\n"
-    "         input (csv, or --input-format)\n"
+    "         .vtk, .vtp, .vtu, .msh, .mesh, .14, .2dm and .npz; each but .npz may be compressed (.csv.gz); \"-\" is\n"
+    "         standard input (csv, or --input-format)\n"
     "Domains: in 2-D, .poly (Triangle's, with .node), .geojson, .geojsonl, .ndjson, .wkt and .shp; with --segments\n"
-    "         lines of .obj and polylines of .csv\n";
+    "         lines of .obj, polylines of .csv and boundaries of .14 (ADCIRC)\n";
 
 const char kMeshesHelp[] =
     "Meshes:  .vtu, .vtkhdf, .vtk, .xdmf (with .h5), .msh (Gmsh 4.1; --format msh22: 2.2), .mesh (MEDIT), .su2 and\n"
     "         .inp (Abaqus), 2-D and 3-D; .npz (arrays of numpy), .node and .ele, with .edge or .face, and .poly;\n"
+    "         .14 (ADCIRC) and .2dm (SMS), 2-D;\n"
     "         \"-\" is standard output (vtu).\n"
     "         Each has the boundary: the faces xmin, xmax, ymin, ... of the box are tagged 1, 2, 3, ...\n";
 

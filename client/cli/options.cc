@@ -69,9 +69,9 @@ uint64_t ParseCount(const std::string& name, std::string_view text, uint64_t lea
 
 void AddMeshInput(CLI::App& command, std::string& path) {
   command
-      .add_option(
-          "MESH", path,
-          "File of the mesh (.vtu, .vtk, .vtp, .npz, .msh, .mesh, or .node with .ele), or - for standard input (vtu)")
+      .add_option("MESH", path,
+                  "File of the mesh (.vtu, .vtk, .vtp, .npz, .msh, .mesh, .14, .2dm, or .node with .ele), or - for "
+                  "standard input (vtu)")
       ->required()
       ->type_name("FILE");
 }

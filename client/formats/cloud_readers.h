@@ -34,6 +34,8 @@ absl::Status ReadVtp(InputFile& file, const CloudOptions& options, PointCloud& c
 absl::Status ReadVtuPoints(InputFile& file, const CloudOptions& options, PointCloud& cloud);
 absl::Status ReadMshPoints(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
 absl::Status ReadMeditPoints(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
+absl::Status ReadAdcircPoints(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
+absl::Status Read2dmPoints(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
 absl::Status ReadNpzPoints(InputFile& file, const CloudOptions& options, PointCloud& cloud);
 
 // These leave options.columns to TakeColumns, which is called with what they return when no dimension was asked for.

@@ -13,10 +13,15 @@
 namespace wellspace::formats {
 namespace {
 
+// Whether ReadCloud tells what points of a mesh have beside coordinates.
+bool HasPointData(const std::string& format) {
+  return format == "vtu" || format == "vtk" || format == "vtp" || format == "adcirc" || format == "2dm";
+}
+
 bool IsVtkFormat(const std::string& format) { return format == "vtu" || format == "vtk" || format == "vtp"; }
 
-// Takes the data of points of a file of VTK: what the mesher has written there tells input points and origins, the rest
-// are attributes. A file without is a mesh all the same.
+// Takes the data of points of a file of such a format: what the mesher has written there tells input points and
+// origins, the rest are attributes. A file without is a mesh all the same.
 void TakePointData(const std::string& path, MeshOrCloud& read) {
   absl::StatusOr<PointCloud> cloud = ReadCloud(path, {.format = read.format, .keep_attributes = true});
   if (!cloud.ok() || cloud->size() != read.mesh.View().vertex_count()) {
@@ -51,7 +56,7 @@ absl::StatusOr<MeshOrCloud> ReadMeshOrCloud(const std::string& path, const Cloud
       read.format = mesh_format;
       read.mesh = *std::move(mesh);
       read.notes = read.mesh.notes;
-      if (IsVtkFormat(mesh_format)) {
+      if (HasPointData(mesh_format)) {
         TakePointData(path, read);
       }
       return read;

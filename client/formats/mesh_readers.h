@@ -17,6 +17,8 @@ absl::StatusOr<Mesh> ReadMsh(const std::string& path, const std::string& numbers
 absl::StatusOr<Mesh> ReadVtk(const std::string& path);
 absl::StatusOr<Mesh> ReadVtpMesh(const std::string& path);
 absl::StatusOr<Mesh> ReadMedit(const std::string& path);
+absl::StatusOr<Mesh> ReadAdcirc(const std::string& path);
+absl::StatusOr<Mesh> Read2dm(const std::string& path);
 // `path` is that of either file.
 absl::StatusOr<Mesh> ReadNodeAndEle(const std::string& path);
 

@@ -38,6 +38,12 @@ absl::StatusOr<std::unique_ptr<MeshWriter>> CreateSu2(const std::string& path, c
 absl::StatusOr<std::unique_ptr<MeshWriter>> CreateAbaqus(const std::string& path, const MeshShape& shape,
                                                          std::stop_token stop);
 
+// These are of the plane alone.
+absl::StatusOr<std::unique_ptr<MeshWriter>> CreateAdcirc(const std::string& path, const MeshShape& shape,
+                                                         std::stop_token stop);
+absl::StatusOr<std::unique_ptr<MeshWriter>> Create2dm(const std::string& path, const MeshShape& shape,
+                                                      std::stop_token stop);
+
 absl::StatusOr<std::unique_ptr<MeshWriter>> CreateVtk(const std::string& path, const MeshShape& shape,
                                                       std::stop_token stop);
 // All of XdmfFilesOf are written, the last two for a boundary.

@@ -62,6 +62,8 @@ std::span<const Format<CloudReader>> CloudReaders() {
       {"msh", {".msh"}, ReadText<ReadMshPoints>},
       {"medit", {".mesh"}, ReadText<ReadMeditPoints>},
       {"npz", {".npz"}, ReadNpzPoints},
+      {"adcirc", {".14", ".grd", ".gr3"}, ReadText<ReadAdcircPoints>},
+      {"2dm", {".2dm"}, ReadText<Read2dmPoints>},
   };
   return readers;
 }

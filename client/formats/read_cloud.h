@@ -34,7 +34,8 @@
 //   msh   Gmsh's, versions as ReadMesh takes them: all nodes, whatever the elements are.
 //   medit INRIA's .mesh in ascii: all vertices, whatever the elements are.
 //   npz   numpy's archive of arrays: the rows of `points`, as npy.
-// Of ply, off, msh and medit, what follows the last point is not looked at.
+//   adcirc, 2dm  All nodes in the plane, whatever the elements are; "depth" or "elevation" is beside them.
+// Of ply, off, msh, medit and adcirc, what follows the last point is not looked at.
 // Points of vtk, vtp, vtu, msh and medit that all have z = 0 are taken in the plane, unless three dimensions or columns
 // are asked for: these formats have a third coordinate there, too.
 // In those of text lines end in LF, CRLF or CR, '#' at the start of a line or after a blank starts a comment, and blank

@@ -30,6 +30,8 @@ std::span<const Format<MeshReader>> MeshReaders() {
       {"npz", {".npz"}, Read<ReadNpz>},
       {"msh", {".msh"}, Read<ReadMsh>},
       {"medit", {".mesh"}, ReadMedit},
+      {"adcirc", {".14", ".grd", ".gr3"}, ReadAdcirc},
+      {"2dm", {".2dm"}, Read2dm},
       {"node", {".node", ".ele"}, ReadNodeAndEle},
   };
   return readers;

@@ -20,6 +20,10 @@
 //         elements, also those of higher order, are refused. Weights are the $NodeData "weights".
 //   medit INRIA's .mesh in ascii, of triangles, which in dimension 3 are in the plane z = 0, or of tetrahedra; edges in
 //         2-D, and triangles in 3-D, with another reference than 0 are the boundary; all else in it is skipped.
+//   adcirc  ADCIRC's fort.14 or SCHISM's grid, of triangles: its boundaries are parts with tags from 1 on, in their
+//         order, or as write_mesh.h has them. Of barriers the front is read.
+//   2dm   SMS's 2-D meshes of triangles, cards in any order: strings (NS) are parts with their numbers as tags, or from
+//         1 on; materials are regions.
 //
 // Regions are where write_mesh.h says; in .msh that is the first physical group of a simplex, or 0. If all simplices
 // are of 0, nothing is told of regions. In .ele all first attributes have to be whole numbers of 32 bits. What is left

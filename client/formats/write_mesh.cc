@@ -51,6 +51,8 @@ std::span<const Format<WriterKind>> Writers() {
       {"xdmf", {".xdmf"}, {CreateXdmf, 3, "xdmf has its arrays in a file of HDF5 beside it", true, XdmfFilesOf, true}},
       {"su2", {".su2"}, {CreateSu2, 3, nullptr, false, nullptr, false, false}},
       {"abaqus", {".inp"}, {CreateAbaqus, 3, nullptr, false}},
+      {"adcirc", {".14", ".grd", ".gr3"}, {CreateAdcirc, 2, nullptr, false, nullptr, true, false}},
+      {"2dm", {".2dm"}, {Create2dm, 2, nullptr, false, nullptr, true}},
   };
   return writers;
 }

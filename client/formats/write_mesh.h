@@ -23,6 +23,11 @@
 //         of the simplices by their regions. There is no place for weights. Their readers take 20 characters of a
 //         number: the shortest form of a coordinate if that fits, else the nearest number of so many. A mesh of which
 //         a simplex would lose its orientation by that is refused.
+//   adcirc  ADCIRC's fort.14, which SCHISM reads as well, 2-D only. The depth of a node is the attribute "depth" or,
+//         with the other sign, "elevation"; -99999 where that is missing, 0 everywhere without both. There is no place
+//         for weights, and none for regions.
+//   2dm   SMS's 2-D meshes: the z of a node is the attribute "elevation" or, with the other sign, "depth"; else 0.
+//         There is no place for weights.
 // xdmf, su2 and abaqus are not read back.
 //
 // With a boundary there are, beside that:
@@ -38,6 +43,10 @@
 //   xdmf  NAME_boundary.xdmf with the grid "boundary" of facets, which have their tag as cell data "boundary"; its
 //         arrays in NAME_boundary.h5.
 //   su2   markers; those of parts without facets are left out.
+//   adcirc  strings of nodes, of edges with a triangle on one side alone: open ones of parts whose names start with
+//         "open" or "ocean", the others of land, with the type that a name such as "land 0" says, or 20, or 21 of a
+//         ring around a hole. Tags and names stand behind the numbers, as names.h has them.
+//   2dm   NS of the nodes of each part, with the tag as number.
 //   abaqus  *NSET of the vertices and *SURFACE of the sides of elements, one each of every part.
 // Labels of su2 and abaqus are names as Labels makes them (labels.h).
 //
@@ -45,11 +54,11 @@
 // point data of vtu, vtkhdf, vtk and xdmf under their names, "attribute_NAME" in npz. Other formats leave them out.
 //
 // Where regions are told, each simplex has the id of its own: cell data "region" of vtu, vtkhdf and vtk; `regions` of
-// npz, with names in `region_names` for the ids in `region_ids`; the attribute of .ele; the reference of medit. In
-// msh41 and msh22 each region is a physical group with its id and a name, whatever the numbers of parts of the
-// boundary: Gmsh counts groups by their dimensions. With several regions, in msh41 each is an entity with a block of
-// its own: simplices stand by regions in ascending order, otherwise in the order in which they came. Names of parts and
-// regions that have no other place: see names.h.
+// npz, with names in `region_names` for the ids in `region_ids`; the attribute of .ele; the reference of medit; the
+// material of 2dm. In msh41 and msh22 each region is a physical group with its id and a name, whatever the numbers of
+// parts of the boundary: Gmsh counts groups by their dimensions. With several regions, in msh41 each is an entity with
+// a block of its own: simplices stand by regions in ascending order, otherwise in the order in which they came. Names
+// of parts and regions that have no other place: see names.h.
 #ifndef WELLSPACE_CLIENT_FORMATS_WRITE_MESH_H_
 #define WELLSPACE_CLIENT_FORMATS_WRITE_MESH_H_
 

@@ -39,6 +39,7 @@ constexpr std::array kChoices = {
     Choice{"geojsonl", false, true},
     Choice{"wkt"},
     Choice{"shp"},
+    Choice{"adcirc"},
 };
 
 bool AreSameBits(const std::vector<double>& a, const std::vector<double>& b) {

@@ -1,6 +1,6 @@
 // Every reader of meshes, on any text, and the decoder of VTK's binary arrays.
 //
-// Input: a digit from 0 to 9, then
+// Input: a character from 0 to ; then
 //   0  a .vtu file;
 //   1  a .node file, '|', the .ele file;
 //   2  a byte whose lowest bits say compressed, big-endian, eight-byte header; the bytes of an array before they were
@@ -10,7 +10,9 @@
 //   6  a .mesh file;
 //   7  a .vtk file;
 //   8  a .vtp file;
-//   9  a byte as of 2, of which the fourth bit says base64; what follows where an array begins in appended data.
+//   9  a byte as of 2, of which the fourth bit says base64; what follows where an array begins in appended data;
+//   :  a .14 file;
+//   ;  a .2dm file.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -127,6 +129,16 @@ void ReadVtp(std::string_view content) {
   ReadWriteRead(folder.Write("mesh.vtp", content), folder.Path("again.vtu"));
 }
 
+void ReadAdcirc(std::string_view content) {
+  const ScratchFolder& folder = ScratchFolder::Get();
+  ReadWriteRead(folder.Write("mesh.14", content), folder.Path("again.14"));
+}
+
+void Read2dm(std::string_view content) {
+  const ScratchFolder& folder = ScratchFolder::Get();
+  ReadWriteRead(folder.Write("mesh.2dm", content), folder.Path("again.2dm"));
+}
+
 void DecodeAppended(uint8_t flags, std::string_view data) {
   const formats::VtkEncoding encoding = {
       .compressed = (flags & 1) != 0, .big_endian = (flags & 2) != 0, .header_word_bytes = (flags & 4) != 0 ? 8 : 4};
@@ -166,7 +178,7 @@ void DecodeArray(uint8_t flags, std::string_view array) {
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   wellspace::fuzz::ByteReader bytes(data, size);
-  switch (static_cast<uint8_t>(bytes.Next() - '0') % 10) {
+  switch (static_cast<uint8_t>(bytes.Next() - '0') % 12) {
     case 0:
       wellspace::fuzz::ReadVtu(bytes.TakeText());
       break;
@@ -198,6 +210,12 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       wellspace::fuzz::DecodeAppended(flags, bytes.TakeText());
       break;
     }
+    case 10:
+      wellspace::fuzz::ReadAdcirc(bytes.TakeText());
+      break;
+    case 11:
+      wellspace::fuzz::Read2dm(bytes.TakeText());
+      break;
     default: {
       size_t length = bytes.Next();
       length += size_t{256} * bytes.Next();

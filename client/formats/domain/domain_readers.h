@@ -19,6 +19,7 @@ absl::Status ReadGeoJson(InputFile& file, const DomainOptions& options, PlanarDo
 absl::Status ReadGeoJsonLines(InputFile& file, const DomainOptions& options, PlanarDomain& domain);
 absl::Status ReadWkt(InputFile& file, const DomainOptions& options, PlanarDomain& domain);
 absl::Status ReadShapefile(InputFile& file, const DomainOptions& options, PlanarDomain& domain);
+absl::Status ReadAdcircBoundary(InputFile& file, PlanarDomain& domain);
 absl::Status ReadObjLines(InputFile& file, PlanarDomain& domain);
 absl::Status ReadPolylines(InputFile& file, const DomainOptions& options, PlanarDomain& domain);
 

@@ -13,7 +13,7 @@
 namespace wellspace::formats {
 namespace {
 
-enum class Kind { kPoly, kGeoJson, kGeoJsonLines, kWkt, kShapefile, kObj, kCsv };
+enum class Kind { kPoly, kGeoJson, kGeoJsonLines, kWkt, kShapefile, kAdcirc, kObj, kCsv };
 
 std::span<const Format<Kind>> Kinds() {
   static const std::vector<Format<Kind>> kinds = {
@@ -22,6 +22,7 @@ std::span<const Format<Kind>> Kinds() {
       {"geojsonl", {".geojsonl", ".geojsons", ".ndjson"}, Kind::kGeoJsonLines},
       {"wkt", {".wkt"}, Kind::kWkt},
       {"shp", {".shp"}, Kind::kShapefile},
+      {"adcirc", {".14", ".grd", ".gr3"}, Kind::kAdcirc},
       {"obj", {".obj"}, Kind::kObj},
       {"csv", {".csv", ".tsv", ".txt", ".dat"}, Kind::kCsv},
   };
@@ -62,6 +63,8 @@ absl::Status Read(InputFile& file, const std::string& path, Kind kind, const Dom
       return ReadWkt(file, options, domain);
     case Kind::kShapefile:
       return ReadShapefile(file, options, domain);
+    case Kind::kAdcirc:
+      return ReadAdcircBoundary(file, domain);
     case Kind::kObj:
       return ReadObjLines(file, domain);
     case Kind::kCsv:

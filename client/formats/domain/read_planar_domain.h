@@ -18,6 +18,8 @@
 //            Z, M or ZM and an "SRID=…;" before them or not. As the features of a file of geojson.
 //   shp      ESRI's shapefile, without the files beside it: points, polylines and polygons, with Z and M or not. Each
 //            record is as a feature of geojson, rings in any order; null shapes are counted.
+//   adcirc   ADCIRC's fort.14 or SCHISM's grid: its boundaries are segments, with markers from 1 on in their order, and
+//            their nodes the points. Elements and other nodes are not looked at. Faces: kEvenOdd.
 //   obj      Wavefront's: all vertices ("v") become points, and lines ("l") segments, with indices from 1 or, negative,
 //            from the last vertex back. A third coordinate has to be the same in all. Faces ("f") are skipped. Faces
 //            of the domain: kBox.
@@ -55,7 +57,7 @@ struct DomainOptions {
 // The names that DomainOptions::format may take.
 std::vector<std::string> DomainFormats();
 
-// Those of them whose files have a planar domain and no cloud: all but obj and csv.
+// Those of them whose files have a planar domain and no cloud: all but adcirc, obj and csv.
 std::vector<std::string> DomainOnlyFormats();
 bool IsDomainFormat(const std::string& format);
 

@@ -158,6 +158,19 @@ TEST_F(DomainCommandsTest, OtherFormatsOfRingsMakeTheMeshOfGeoJson) {
             0);
 }
 
+// A grid of ADCIRC's to another one: the boundaries are the domain.
+TEST_F(DomainCommandsTest, AGridIsMeshedAnew) {
+  folder_.Write("a.wkt", "POLYGON((0 0,9 0,9 9,0 9,0 0),(3 3,6 3,6 6,3 6,3 3))\n");
+  ASSERT_EQ(RunWellspace({"mesh", Path("a.wkt"), "-o", Path("a.14")}).exit_code, 0);
+  const RunResult finer = RunWellspace({"mesh", Path("a.14"), "--segments", "--size", "0.5", "-o", Path("b.14")});
+  ASSERT_EQ(finer.exit_code, 0) << finer.err;
+  const RunResult check = RunWellspace({"check", Path("b.14"), "--cloud", Path("a.14"), "--segments", "--size", "0.5"});
+  EXPECT_EQ(check.exit_code, 0) << check.out << check.err;
+  // Without --segments it has points.
+  ASSERT_EQ(RunWellspace({"mesh", Path("a.14"), "-o", Path("box.14")}).exit_code, 0);
+  EXPECT_THAT(RunWellspace({"info", Path("box.14")}).out, HasSubstr("boundary             4 ymax"));
+}
+
 TEST_F(DomainCommandsTest, CheckTakesEachStretchOfASegmentByItself) {
   Mesh("notch.geojson", R"({"type": "Polygon", "coordinates":
       [[[0, 0], [10, 0], [10, 10], [0, 10], [0, 0]], [[0, 1], [3, 2], [0, 3], [0, 1]]]})");

@@ -26,8 +26,10 @@ struct Kind {
   const char* format;
   const char* file;
 };
-constexpr Kind kKinds[] = {{"vtu", "a.vtu"},   {"vtk", "a.vtk"},    {"npz", "a.npz"},  {"msh41", "a.msh"},
-                           {"msh22", "b.msh"}, {"medit", "a.mesh"}, {"node", "a.node"}};
+constexpr Kind kKinds[] = {{"vtu", "a.vtu"},   {"vtk", "a.vtk"},    {"npz", "a.npz"},   {"msh41", "a.msh"},
+                           {"msh22", "b.msh"}, {"medit", "a.mesh"}, {"node", "a.node"}, {"2dm", "a.2dm"}};
+
+bool Holds(const Kind& kind, int dimension) { return dimension == 2 || kind.format != std::string_view("2dm"); }
 
 // What a mesh has, in an order of its own: simplices and facets with the number and the name that they have.
 using Row = std::pair<std::vector<uint32_t>, std::pair<int32_t, std::string>>;
@@ -104,6 +106,9 @@ class EveryPairTest : public MeshFilesFixture {
     const Content content = ContentOf(mesh);
     for (const Kind& from : kKinds) {
       for (const Kind& to : kKinds) {
+        if (!Holds(from, mesh.dimension) || !Holds(to, mesh.dimension)) {
+          continue;
+        }
         SCOPED_TRACE(std::string(from.format) + " to " + to.format + " in " + std::to_string(mesh.dimension) + "-D");
         WriteNoted(mesh, from);
         Mesh read = ReadGood(from.file);
@@ -148,7 +153,8 @@ TEST_F(EveryPairTest, NamesThatCannotBeKeptAreToldOf) {
     SCOPED_TRACE(kind.format);
     const bool is_npz = kind.format == std::string("npz");  // 1024 characters
     const std::vector<std::string> notes = WriteNoted(mesh, kind);
-    EXPECT_EQ(notes.size(), is_npz ? 0 : kind.format[1] == 's' ? 2 : 1) << testing::PrintToString(notes);
+    const size_t heights = kind.format[1] == 'd' ? 1 : 0;  // nodes of 2dm have none
+    EXPECT_EQ(notes.size() - heights, is_npz ? 0 : kind.format[1] == 's' ? 2 : 1) << testing::PrintToString(notes);
     const std::string name = ReadGood(kind.file).boundary[0].name;
     EXPECT_EQ(name, mesh.boundary[0].name.substr(0, name.size()));
     EXPECT_EQ(name.size() == 702, is_npz);
@@ -158,7 +164,8 @@ TEST_F(EveryPairTest, NamesThatCannotBeKeptAreToldOf) {
     SCOPED_TRACE(kind.format);
     const bool is_msh = kind.format[1] == 's';
     const std::vector<std::string> notes = WriteNoted(mesh, kind);
-    EXPECT_EQ(notes.size(), is_msh ? 2 : 0) << testing::PrintToString(notes);  // one of numbers below 0
+    const size_t heights = kind.format[1] == 'd' ? 1 : 0;
+    EXPECT_EQ(notes.size() - heights, is_msh ? 2 : 0) << testing::PrintToString(notes);  // one of numbers below 0
     EXPECT_EQ(ReadGood(kind.file).boundary[0].name, is_msh ? "in _quotes__and lines" : mesh.boundary[0].name);
   }
 }
