@@ -14,6 +14,7 @@
 #include "client/formats/io/number.h"
 #include "client/formats/io/open_input.h"
 #include "client/formats/mesh_readers.h"
+#include "client/formats/raster/raster_sizes.h"
 #include "client/formats/registry.h"
 #include "client/formats/table_columns.h"
 #include "core/base/status_macros.h"
@@ -145,6 +146,16 @@ absl::Status ReadOfMesh(const std::string& path, int dimension, SizedPoints& siz
   return absl::OkStatus();
 }
 
+using RasterReader = absl::Status (*)(const std::string&, SizedPoints&);
+
+template <RasterReader kReader>
+absl::Status ReadRaster(const std::string& path, int dimension, SizedPoints& sized) {
+  return dimension == 2
+             ? kReader(path, sized)
+             : absl::InvalidArgumentError(absl::StrCat(
+                   path, ": a raster has sizes in the plane; expected those of a mesh in ", dimension, "-D"));
+}
+
 using SizeReader = absl::Status (*)(const std::string&, int, SizedPoints&);
 
 std::span<const Format<SizeReader>> SizeReaders() {
@@ -153,6 +164,7 @@ std::span<const Format<SizeReader>> SizeReaders() {
       {"vtu", {".vtu"}, ReadOfMesh<ReadVtu>},
       {"msh", {".msh"}, ReadOfMesh<ReadMsh>},
       {"npz", {".npz"}, ReadOfMesh<ReadNpz>},
+      {"esri", {".asc"}, ReadRaster<ReadEsriGrid>},
   };
   return readers;
 }

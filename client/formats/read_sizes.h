@@ -7,7 +7,9 @@
 //   vtu   As in read_mesh.h, with point data "h".
 //   msh   The same, with $NodeData "h".
 //   npz   The same, with an array `h`; `simplices` may be missing.
-// Tables may be compressed by gzip.
+//   esri  ESRI's grid in ascii, .asc, of sizes in the plane: each cell has the size of its centre, those without data
+//         none, which is noted.
+// Tables and esri may be compressed by gzip.
 #ifndef WELLSPACE_CLIENT_FORMATS_READ_SIZES_H_
 #define WELLSPACE_CLIENT_FORMATS_READ_SIZES_H_
 
@@ -22,7 +24,7 @@ namespace wellspace::formats {
 
 // Points with a size each.
 struct SizedPoints {
-  PointCloud cloud;           // of the points; its origins say where each was read
+  PointCloud cloud;           // of the points; its origins say where each was read, of a raster the cells from 0 on
   std::vector<double> sizes;  // of each, above 0 and finite
 };
 

@@ -108,5 +108,48 @@ TEST_F(ReadSizesTest, OfAMshItsNodeData) {
   EXPECT_THAT(Refusal("s.msh", kMsh, 2), HasSubstr("no data of its points are called \"h\""));
 }
 
+// As GDAL and ArcGIS write it: words in any case, the lower left corner or its cell's centre, lines of any length.
+constexpr char kEsriGrid[] =
+    "ncols        3\nnrows        2\nxllcorner    100.0\nyllcorner    -20\ncellsize     10\nNODATA_value  -9999\n"
+    " 1 2 -9999\n 4\n 5.5 nan\n";
+
+TEST_F(ReadSizesTest, OfAnEsriGridTheCentresOfItsCells) {
+  const SizedPoints read = Read("s.asc", kEsriGrid, 2);
+  EXPECT_THAT(read.cloud.points, ElementsAre(105, -5, 115, -5, 105, -15, 115, -15));
+  EXPECT_THAT(read.sizes, ElementsAre(1, 2, 4, 5.5));
+  EXPECT_EQ(read.cloud.skipped, 2);
+  EXPECT_THAT(read.cloud.notes, ElementsAre(HasSubstr("2 of 6 cells of the raster have no data, and no size")));
+  EXPECT_EQ(read.cloud.Origin(2), folder_.Path("s.asc") + "[3]");
+  const SizedPoints centres = Read("s.asc", "NCOLS 1\nNROWS 2\nXLLCENTER 1\nYLLCENTER 2\nDX 1\nDY 0.5\n7 8", 2);
+  EXPECT_THAT(centres.cloud.points, ElementsAre(1, 2.5, 1, 2));
+  EXPECT_THAT(centres.sizes, ElementsAre(7, 8));
+  EXPECT_TRUE(centres.cloud.notes.empty());
+}
+
+TEST_F(ReadSizesTest, WhatIsWrongInAnEsriGridIsToldWithItsLine) {
+  const auto refusal = [this](const std::string& from, const std::string& to) {
+    std::string text = kEsriGrid;
+    text.replace(text.find(from), from.size(), to);
+    return Refusal("s.asc", text, 2);
+  };
+  EXPECT_THAT(Refusal("s.asc", "", 2), HasSubstr("expected ncols in the header, a whole number from 1 on"));
+  EXPECT_THAT(refusal("ncols        3", "ncols 2.5"), HasSubstr("expected ncols in the header, a whole number from 1"));
+  EXPECT_THAT(refusal("ncols        3", "ncols 4000000000"), HasSubstr("expected fewer than 2^32 cells, at least one"));
+  EXPECT_THAT(refusal("ncols        3", "nculs 3"),
+              HasSubstr("s.asc:1: expected a word of the header of an ESRI grid"));
+  EXPECT_THAT(refusal("nrows        2", "ncols 3"), HasSubstr("s.asc:2: expected ncols once, got it again"));
+  EXPECT_THAT(refusal("xllcorner    100.0", "xllcorner inf"),
+              HasSubstr("s.asc:3: xllcorner: expected a finite number"));
+  EXPECT_THAT(refusal("xllcorner    100.0", ""), HasSubstr("expected either xllcorner or xllcenter in the header"));
+  EXPECT_THAT(refusal("cellsize     10", "cellsize 10 dx 10"), HasSubstr("expected either cellsize or dx"));
+  EXPECT_THAT(refusal("cellsize     10", "cellsize 0"), HasSubstr("expected cells with a width and a height above 0"));
+  EXPECT_THAT(refusal("cellsize     10", "cellsize 1e308"), HasSubstr("expected cells with a width and a height"));
+  EXPECT_THAT(refusal(" 4\n", " x\n"), HasSubstr("s.asc:8: a cell: expected a number, got \"x\""));
+  EXPECT_THAT(refusal(" nan", ""), HasSubstr("s.asc:9: the file ends; expected 6 cells, got 5"));
+  EXPECT_THAT(refusal(" nan", " 1 1"), HasSubstr("s.asc:9: expected 6 cells, as the header says, got more"));
+  EXPECT_THAT(refusal(" 4\n", " 0\n"), HasSubstr("s.asc[3]: size 0 is not allowed; a number above 0 is"));
+  EXPECT_THAT(Refusal("s.asc", kEsriGrid, 3), HasSubstr("a raster has sizes in the plane"));
+}
+
 }  // namespace
 }  // namespace wellspace::formats
