@@ -50,7 +50,7 @@ points and meshes; with files for CMake and pkg-config, and the protos.")
 # The compiler, since CMake finds Debian's gRPC only where gRPC's plugin for it is.
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
     "libabsl-dev, libtbb-dev, libgrpc++-dev, protobuf-compiler-grpc, libprotobuf-dev, libhdf5-dev, libminizip-dev"
-    "zlib1g-dev, pkg-config")
+    "zlib1g-dev, liblzma-dev, pkg-config")
 list(JOIN CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS ", " CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS)
 
 wellspace_package(PYTHON python3-wellspace python "quality meshes of point clouds and planar domains (Python)"

@@ -10,7 +10,7 @@ set -euo pipefail
 declare -A packages=(
   [build]="g++ cmake ninja-build pkg-config libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
            libabsl-dev libc-ares-dev libspdlog-dev libboost-dev libtbb-dev libcli11-dev nlohmann-json3-dev
-           prometheus-cpp-dev libcairo2-dev zlib1g-dev libminizip-dev libhdf5-dev
+           prometheus-cpp-dev libcairo2-dev zlib1g-dev liblzma-dev libminizip-dev libhdf5-dev
            libsqlite3-dev python3"
   [test]="libgtest-dev libgmock-dev libcgal-dev libeigen3-dev python3 python3-grpcio python3-meshio python3-numpy openssl
           python3-protobuf python3-scipy python3-tqdm libisal2 mypy
@@ -27,7 +27,7 @@ declare -A packages=(
   [package]="dpkg-dev lintian groff-base debootstrap"
   [monitoring]="prometheus"
   [runtime]="libgrpc++1.51 libprotobuf32 libabsl20220623 libspdlog1.10 libtbb12 libprometheus-cpp-core1.0 libcairo2 zlib1g
-             libminizip1 libsz2 libsqlite3-0"
+             libminizip1 liblzma5 libsz2 libsqlite3-0"
 )
 packages[dev]="${packages[build]} ${packages[test]} ${packages[lint]} ${packages[tidy]} ${packages[fuzz]}"
 

@@ -2,9 +2,9 @@
 //
 // Formats:
 //   vtu   VTK's XML, pieces of triangles in the plane z = 0 or of tetrahedra; arrays in ascii, inline in base64, or
-//         appended as bytes or in base64, compressed by zlib or not; either byte order. Weights are the point data
-//         "weights". With the cell data "boundary", lines beside triangles, and triangles beside tetrahedra, are the
-//         boundary where it is not 0.
+//         appended as bytes or in base64, compressed by zlib, LZ4, LZMA or not; either byte order. Weights are the
+//         point data "weights". With the cell data "boundary", lines beside triangles, and triangles beside tetrahedra,
+//         are the boundary where it is not 0.
 //   vtk   The same in VTK's legacy format, ascii or binary, of the kinds UNSTRUCTURED_GRID and POLYDATA.
 //   vtp   VTK's XML of polygons, which are triangles in the plane z = 0.
 //   npz   numpy's archive of arrays: `points` of floating-point numbers of 4 or 8 bytes or whole ones, vertices x

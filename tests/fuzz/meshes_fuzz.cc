@@ -3,10 +3,12 @@
 // Input: a character from 0 to ; then
 //   0  a .vtu file;
 //   1  a .node file, '|', the .ele file;
-//   2  a byte whose lowest bits say compressed, big-endian, eight-byte header; the bytes of an array before they were
-//   put into base64; 3  a .npz file;
-//   4  two bytes, the length of the first array of a .npz in little-endian order; that array and the second one, each a
-//   .npy; 5  a .msh file;
+//   2  a byte whose lowest bits say compressed, big-endian, eight-byte header, and whose fifth and sixth say by LZ4 or
+//      by xz; the bytes of an array before they were put into base64;
+//   3  a .npz file;
+//   4  two bytes, the length of the first array of a .npz in little-endian order; that array and the second one, each
+//      a .npy;
+//   5  a .msh file;
 //   6  a .mesh file;
 //   7  a .vtk file;
 //   8  a .vtp file;
@@ -139,9 +141,18 @@ void Read2dm(std::string_view content) {
   ReadWriteRead(folder.Write("mesh.2dm", content), folder.Path("again.2dm"));
 }
 
+// The first bit and, with it, the fifth and sixth.
+formats::VtkCompressor CompressorOf(uint8_t flags) {
+  using formats::VtkCompressor;
+  return (flags & 1) == 0        ? VtkCompressor::kNone
+         : (flags >> 4) % 4 == 1 ? VtkCompressor::kLz4
+         : (flags >> 4) % 4 == 2 ? VtkCompressor::kLzma
+                                 : VtkCompressor::kZlib;
+}
+
 void DecodeAppended(uint8_t flags, std::string_view data) {
   const formats::VtkEncoding encoding = {
-      .compressed = (flags & 1) != 0, .big_endian = (flags & 2) != 0, .header_word_bytes = (flags & 4) != 0 ? 8 : 4};
+      .compressor = CompressorOf(flags), .big_endian = (flags & 2) != 0, .header_word_bytes = (flags & 4) != 0 ? 8 : 4};
   if (const auto decoded = formats::DecodeAppendedVtkArray(data, (flags & 8) != 0, encoding); !decoded.ok()) {
     RequireInvalidArgument(decoded.status());
   }
@@ -163,7 +174,7 @@ void ReadArrays(std::string_view points, std::string_view simplices) {
 
 void DecodeArray(uint8_t flags, std::string_view array) {
   const formats::VtkEncoding encoding = {
-      .compressed = (flags & 1) != 0, .big_endian = (flags & 2) != 0, .header_word_bytes = (flags & 4) != 0 ? 8 : 4};
+      .compressor = CompressorOf(flags), .big_endian = (flags & 2) != 0, .header_word_bytes = (flags & 4) != 0 ? 8 : 4};
   std::string text;
   formats::AppendBase64(array, text);
   const absl::StatusOr<std::string> bytes = formats::DecodeBase64(text);

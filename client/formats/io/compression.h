@@ -1,8 +1,12 @@
-// What all writers and readers of deflate in formats of meshes share.
+// Blocks that were compressed as a whole, and what writers and readers of deflate share.
 #ifndef WELLSPACE_CLIENT_FORMATS_IO_COMPRESSION_H_
 #define WELLSPACE_CLIENT_FORMATS_IO_COMPRESSION_H_
 
 #include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "absl/status/statusor.h"
 
 namespace wellspace::formats {
 
@@ -11,6 +15,14 @@ inline constexpr int kCompressionLevel = 1;
 
 // zlib never makes more than about 1032 bytes of one.
 inline constexpr uint64_t kMaxExpansion = 1040;
+
+// The `size` bytes that were compressed to `compressed`: by zlib, as a stream of xz, as a block of LZ4.
+//
+// Memory:     no more than what `compressed` can stand for, whatever `size` is; for xz 256 MiB beside it.
+// Errors:     INVALID_ARGUMENT, a message without a location: they are not so many, or damaged.
+absl::StatusOr<std::string> InflateZlib(std::string_view compressed, uint64_t size);
+absl::StatusOr<std::string> InflateXz(std::string_view compressed, uint64_t size);
+absl::StatusOr<std::string> InflateLz4(std::string_view compressed, uint64_t size);
 
 }  // namespace wellspace::formats
 

@@ -95,19 +95,15 @@ absl::StatusOr<std::string> Decompress(std::string_view bytes, const VtkEncoding
       return absl::InvalidArgumentError(
           absl::StrCat("block ", block, " says that it has ", compressed, " bytes, and is shorter"));
     }
-    if (size / kMaxExpansion > compressed) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("block ", block, " cannot become ", size, " bytes out of ", compressed));
+    const std::string_view block_text = bytes.substr(position, compressed);
+    const absl::StatusOr<std::string> inflated =
+        encoding.compressor == VtkCompressor::kLz4    ? InflateLz4(block_text, size)
+        : encoding.compressor == VtkCompressor::kLzma ? InflateXz(block_text, size)
+                                                      : InflateZlib(block_text, size);
+    if (!inflated.ok()) {
+      return absl::Status(inflated.status().code(), absl::StrCat("block ", block, " ", inflated.status().message()));
     }
-    const size_t begin = data.size();
-    data.resize(begin + size);
-    uLongf produced = size;
-    const int result = uncompress(reinterpret_cast<Bytef*>(data.data() + begin), &produced,
-                                  reinterpret_cast<const Bytef*>(bytes.data() + position), compressed);
-    if (result != Z_OK || produced != size) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("block ", block, " does not decompress to ", size, " bytes by zlib"));
-    }
+    data += *inflated;
     position += compressed;
   }
   return data;
@@ -251,23 +247,23 @@ absl::StatusOr<std::string> DecodeVtkArray(std::string_view text, const VtkEncod
   if (!bytes.ok()) {
     return bytes;
   }
-  return encoding.compressed ? Decompress(*bytes, encoding) : TakeUncompressed(*bytes, encoding);
+  return encoding.is_compressed() ? Decompress(*bytes, encoding) : TakeUncompressed(*bytes, encoding);
 }
 
 absl::StatusOr<std::string> DecodeAppendedVtkArray(std::string_view data, bool is_base64, const VtkEncoding& encoding) {
   const uint64_t word = encoding.header_word_bytes;
-  if (data.size() < (encoding.compressed ? 3 * word : word)) {
+  if (data.size() < (encoding.is_compressed() ? 3 * word : word)) {
     return absl::InvalidArgumentError("the array ends inside its header");
   }
   if (!is_base64) {
-    return encoding.compressed ? Decompress(data, encoding) : TakeUncompressed(data, encoding);
+    return encoding.is_compressed() ? Decompress(data, encoding) : TakeUncompressed(data, encoding);
   }
   // Nothing but its header tells where an array ends; that of a compressed one is base64 by itself.
-  absl::StatusOr<std::string> start = DecodeBase64Start(data, encoding.compressed ? 3 * word : word);
+  absl::StatusOr<std::string> start = DecodeBase64Start(data, encoding.is_compressed() ? 3 * word : word);
   if (!start.ok()) {
     return start;
   }
-  if (!encoding.compressed) {
+  if (!encoding.is_compressed()) {
     const uint64_t size = LoadHeaderWord(*start, 0, encoding);
     const bool is_apart = start->size() == word && data.substr(0, Base64Size(word)).back() == '=';
     const uint64_t characters = size > data.size() ? data.size() + 1

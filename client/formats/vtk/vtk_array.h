@@ -1,5 +1,5 @@
-// The binary form of data arrays in VTK's XML files: blocks, each compressed by zlib or not at all. Inline it is
-// base64; appended, base64 or the bytes.
+// The binary form of data arrays in VTK's XML files: blocks, each compressed by zlib, LZ4 or xz, or not at all. Inline
+// it is base64; appended, base64 or the bytes.
 //
 // Compressed:   base64(header) base64(blocks); header: number of blocks, bytes of a block, bytes of the last block if
 //               that is shorter (else 0), then the compressed bytes of each block.
@@ -63,11 +63,15 @@ class VtkArrayWriter {
   absl::Status status_;
 };
 
+enum class VtkCompressor { kNone, kZlib, kLz4, kLzma };
+
 // How a file says that its arrays are stored.
 struct VtkEncoding {
-  bool compressed = false;
+  VtkCompressor compressor = VtkCompressor::kNone;
   bool big_endian = false;
   int header_word_bytes = 4;  // 4 or 8
+
+  bool is_compressed() const { return compressor != VtkCompressor::kNone; }
 };
 
 // The bytes of one array. Sizes in `text` are checked against what is there before anything is allocated by them.

@@ -1,9 +1,12 @@
 #include "client/formats/vtk/vtk_xml.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <string_view>
 #include <type_traits>
+#include <utility>
 
 #include "client/formats/coordinate.h"
 #include "client/formats/io/number.h"
@@ -13,6 +16,13 @@ namespace wellspace::formats {
 namespace {
 
 constexpr size_t kMaxDepth = 64;
+
+// As files call them.
+constexpr std::array<std::pair<std::string_view, VtkCompressor>, 4> kCompressors = {
+    {{"", VtkCompressor::kNone},
+     {"vtkZLibDataCompressor", VtkCompressor::kZlib},
+     {"vtkLZ4DataCompressor", VtkCompressor::kLz4},
+     {"vtkLZMADataCompressor", VtkCompressor::kLzma}}};
 
 }  // namespace
 
@@ -136,10 +146,15 @@ absl::Status VtkXmlReader::StartFile() {
   }
   encoding_.header_word_bytes = header == "UInt64" ? 8 : 4;
   const std::string_view compressor = xml_.Attribute("compressor");
-  if (!compressor.empty() && compressor != "vtkZLibDataCompressor") {
-    return xml_.Error(absl::StrCat("expected compressor vtkZLibDataCompressor or none, got ", Quote(compressor)));
+  const auto at = std::find_if(kCompressors.begin(), kCompressors.end(),
+                               [compressor](const auto& one) { return one.first == compressor; });
+  if (at == kCompressors.end()) {
+    return xml_.Error(
+        absl::StrCat("expected compressor vtkZLibDataCompressor, vtkLZ4DataCompressor, "
+                     "vtkLZMADataCompressor or none, got ",
+                     Quote(compressor)));
   }
-  encoding_.compressed = !compressor.empty();
+  encoding_.compressor = at->second;
   return absl::OkStatus();
 }
 

@@ -1,4 +1,4 @@
-"""Gmsh, FreeFEM and VTK read what Wellspace writes: the same counts, the same volume.
+"""Gmsh, FreeFEM and VTK read what Wellspace writes: the same counts, the same volume; it reads what VTK writes.
 
 Wants python3-vtk9, gmsh and freefem++ (deploy/install-deps.sh interoperability).
 """
@@ -103,6 +103,76 @@ class Programs(unittest.TestCase):
                 total = sizes.GetOutput().GetFieldData().GetArray("Area" if dimension == 2 else "Volume").GetValue(0)
                 self.assertAlmostEqual(total, volume, places=12)
 
+    def vtk_grid(self, dimension):
+        import vtk
+        from vtk.util.numpy_support import numpy_to_vtk
+        points, cells, _ = grid(dimension)
+        points = points + numpy.random.default_rng(7).random(points.shape) / 64  # of all bits
+        padded = numpy.hstack([points, numpy.zeros((len(points), 3 - dimension))])
+        coordinates = vtk.vtkPoints()
+        coordinates.SetDataTypeToDouble()
+        coordinates.SetData(numpy_to_vtk(padded, deep=True))
+        mesh = vtk.vtkUnstructuredGrid()
+        mesh.SetPoints(coordinates)
+        for cell in cells:
+            mesh.InsertNextCell(vtk.VTK_TRIANGLE if dimension == 2 else vtk.VTK_TETRA, len(cell), list(map(int, cell)))
+        heat = numpy_to_vtk(points[:, 0] * 3, deep=True)
+        heat.SetName("heat")
+        mesh.GetPointData().AddArray(heat)
+        return mesh, points, cells
+
+    def assert_mesh(self, name, points, cells):
+        self.run_program(CONVERT_MESH, name, "back.npz")
+        with numpy.load(self.folder / "back.npz") as back:
+            numpy.testing.assert_array_equal(back["points"], points)
+            numpy.testing.assert_array_equal(back["simplices"], cells)
+
+    def test_we_read_meshes_of_vtk_however_they_are_encoded(self):
+        import vtk
+        modes = ("Ascii", "Binary", "raw", "base64")
+        compressors = (None, vtk.vtkZLibDataCompressor, vtk.vtkLZ4DataCompressor, vtk.vtkLZMADataCompressor)
+        for dimension in (2, 3):
+            mesh, points, cells = self.vtk_grid(dimension)
+            for mode, compressor, is_wide, is_big in itertools.product(modes, compressors, (False, True),
+                                                                       (False, True)):
+                with self.subTest(dimension=dimension, mode=mode, compressor=compressor, wide=is_wide, big=is_big):
+                    writer = vtk.vtkXMLUnstructuredGridWriter()
+                    writer.SetCompressor(compressor() if compressor else None)
+                    getattr(writer, "SetHeaderTypeToUInt64" if is_wide else "SetHeaderTypeToUInt32")()
+                    getattr(writer, "SetByteOrderToBigEndian" if is_big else "SetByteOrderToLittleEndian")()
+                    getattr(writer, f"SetDataModeTo{mode if mode in modes[:2] else 'Appended'}")()
+                    writer.SetEncodeAppendedData(mode == "base64")
+                    writer.SetBlockSize(1024)  # of several blocks
+                    writer.SetFileName(str(self.folder / "theirs.vtu"))
+                    writer.SetInputData(mesh)
+                    writer.Write()
+                    self.assert_mesh("theirs.vtu", points, cells)
+            for version, is_binary in itertools.product((42, 51), (False, True)):
+                with self.subTest(dimension=dimension, version=version, binary=is_binary):
+                    writer = vtk.vtkUnstructuredGridWriter()
+                    writer.SetFileVersion(version)
+                    writer.SetFileType(2 if is_binary else 1)
+                    writer.SetFileName(str(self.folder / "theirs.vtk"))
+                    writer.SetInputData(mesh)
+                    writer.Write()
+                    rounded = [[float(f"{x:.11g}") for x in point] for point in points]
+                    self.assert_mesh("theirs.vtk", points if is_binary else rounded, cells)
+
+    def test_we_read_pieces_of_vtk(self):
+        import vtk
+        for dimension, compressor in itertools.product((2, 3), (None, vtk.vtkLZ4DataCompressor)):
+            with self.subTest(dimension=dimension, compressor=compressor):
+                mesh, points, cells = self.vtk_grid(dimension)
+                writer = vtk.vtkXMLUnstructuredGridWriter()
+                writer.SetCompressor(compressor() if compressor else None)
+                writer.SetNumberOfPieces(3)
+                writer.SetFileName(str(self.folder / "pieces.vtu"))
+                writer.SetInputData(mesh)
+                writer.Write()
+                self.assertEqual((self.folder / "pieces.vtu").read_bytes().count(b"<Piece"), 3)
+                # The writer asks for each piece, and gets the whole each time.
+                shifts = numpy.repeat(numpy.arange(3), len(cells))[:, None] * len(points)
+                self.assert_mesh("pieces.vtu", numpy.tile(points, (3, 1)), numpy.tile(cells, (3, 1)) + shifts)
 
     def assert_cloud(self, name, points, type="float64"):
         self.run_program(CONVERT_MESH, "--cloud", name, "cloud.npz")

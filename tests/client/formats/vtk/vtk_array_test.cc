@@ -40,8 +40,8 @@ std::string Encode(uint64_t count) {
   return folder.Read("array");
 }
 
-constexpr VtkEncoding kCompressed = {.compressed = true, .big_endian = false, .header_word_bytes = 8};
-constexpr VtkEncoding kPlain = {.compressed = false, .big_endian = false, .header_word_bytes = 8};
+constexpr VtkEncoding kCompressed = {.compressor = VtkCompressor::kZlib, .big_endian = false, .header_word_bytes = 8};
+constexpr VtkEncoding kPlain = {.compressor = VtkCompressor::kNone, .big_endian = false, .header_word_bytes = 8};
 
 TEST(Base64Test, KnownTexts) {
   EXPECT_EQ(Base64(""), "");

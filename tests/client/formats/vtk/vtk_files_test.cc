@@ -315,5 +315,23 @@ TEST_F(VtkFilesTest, HalfAPairIsRefused) {
   EXPECT_TRUE(ReadMeshOrCloud(folder_.Path("a.node"), {.format = "node"}).ok());
 }
 
+// Written by VTK 9.1.
+TEST_F(VtkFilesTest, CompressedByLz4AndLzma) {
+  const char* const folder = std::getenv("WELLSPACE_DATA_DIR");
+  for (const char* name : {"vtk_lz4.vtu", "vtk_lzma.vtu"}) {
+    SCOPED_TRACE(name);
+    const absl::StatusOr<Mesh> mesh =
+        ReadMesh(std::string(folder == nullptr ? "tests/data" : folder) + "/formats/" + name);
+    ASSERT_TRUE(mesh.ok()) << mesh.status();
+    EXPECT_EQ(mesh->dimension, 2);
+    ASSERT_EQ(mesh->points.size(), 50);
+    EXPECT_EQ(mesh->points[49], 4 / 3.0);
+    EXPECT_EQ(mesh->points[48], 1 + 16 / 64.0);
+    ASSERT_EQ(mesh->simplices.size(), 96);
+    EXPECT_THAT(std::vector<uint32_t>(mesh->simplices.begin(), mesh->simplices.begin() + 6),
+                ElementsAre(0, 1, 6, 0, 6, 5));
+  }
+}
+
 }  // namespace
 }  // namespace wellspace::formats
