@@ -31,6 +31,7 @@ absl::Status ReadPcd(LineReader& reader, const CloudOptions& options, PointCloud
 absl::Status ReadLas(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
 absl::Status ReadVtkPoints(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
 absl::Status ReadVtp(InputFile& file, const CloudOptions& options, PointCloud& cloud);
+absl::Status ReadVts(InputFile& file, const CloudOptions& options, PointCloud& cloud);
 absl::Status ReadVtuPoints(InputFile& file, const CloudOptions& options, PointCloud& cloud);
 absl::Status ReadMshPoints(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
 absl::Status ReadMeditPoints(LineReader& reader, const CloudOptions& options, PointCloud& cloud);

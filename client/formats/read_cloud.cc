@@ -58,6 +58,7 @@ std::span<const Format<CloudReader>> CloudReaders() {
       {"las", {".las", ".laz"}, ReadText<ReadLas>},
       {"vtk", {".vtk"}, ReadText<ReadVtkPoints>},
       {"vtp", {".vtp"}, ReadVtp},
+      {"vts", {".vts"}, ReadVts},
       {"vtu", {".vtu"}, ReadVtuPoints},
       {"msh", {".msh"}, ReadText<ReadMshPoints>},
       {"medit", {".mesh"}, ReadText<ReadMeditPoints>},
@@ -69,7 +70,7 @@ std::span<const Format<CloudReader>> CloudReaders() {
 }
 
 // Formats in which points have three coordinates, in the plane, too.
-constexpr std::array<std::string_view, 5> kPadded = {"vtk", "vtp", "vtu", "msh", "medit"};
+constexpr std::array<std::string_view, 6> kPadded = {"vtk", "vtp", "vts", "vtu", "msh", "medit"};
 
 // Of points that all have the same z: takes them in the plane if that is 0 and only there since the format wants it, or
 // tells how to take them so. Points of other formats have the dimension that was asked for.

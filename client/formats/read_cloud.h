@@ -30,14 +30,14 @@
 //   las   1.0 to 1.4 of the ASPRS, point formats 0 to 10; points that are marked as withheld are left out. Compressed
 //         ones (laz) are refused: docs/adr/0034-laz-is-refused.md.
 //   vtk   VTK's legacy format in ascii or binary, of the kinds POLYDATA, UNSTRUCTURED_GRID and STRUCTURED_GRID.
-//   vtp, vtu  VTK's XML, the points of all pieces, arrays as ReadMesh takes them.
+//   vtp, vts, vtu  VTK's XML, the points of all pieces, arrays as ReadMesh takes them.
 //   msh   Gmsh's, versions as ReadMesh takes them: all nodes, whatever the elements are.
 //   medit INRIA's .mesh in ascii: all vertices, whatever the elements are.
 //   npz   numpy's archive of arrays: the rows of `points`, as npy.
 //   adcirc, 2dm  All nodes in the plane, whatever the elements are; "depth" or "elevation" is beside them.
 // Of ply, off, msh, medit and adcirc, what follows the last point is not looked at.
-// Points of vtk, vtp, vtu, msh and medit that all have z = 0 are taken in the plane, unless three dimensions or columns
-// are asked for: these formats have a third coordinate there, too.
+// Points of vtk, vtp, vts, vtu, msh and medit that all have z = 0 are taken in the plane, unless three dimensions or
+// columns are asked for: these formats have a third coordinate there, too.
 // In those of text lines end in LF, CRLF or CR, '#' at the start of a line or after a blank starts a comment, and blank
 // lines are skipped. Numbers may have Fortran's exponents: 1.0D+00, 1.0-100. Each may be compressed by gzip, as
 // "cloud.csv.gz" or on standard input.

@@ -119,8 +119,8 @@ void RequireCloud(const PointCloud& cloud, const CloudOptions& options) {
     Require(options.keep_attributes, "attributes are kept only if that was asked for");
     Require(attribute.values.size() == cloud.size(), "every point has all attributes");
   }
-  constexpr std::array<std::string_view, 13> kMayBeBinary = {"npy", "ply", "stl",   "pcd", "las",    "vtk", "vtp",
-                                                             "vtu", "msh", "medit", "npz", "adcirc", "2dm"};
+  constexpr std::array<std::string_view, 14> kMayBeBinary = {"npy", "ply", "stl", "pcd",   "las", "vtk",    "vtp",
+                                                             "vts", "vtu", "msh", "medit", "npz", "adcirc", "2dm"};
   if (cloud.lines.size() == 0 &&
       std::find(kMayBeBinary.begin(), kMayBeBinary.end(), options.format) != kMayBeBinary.end()) {
     Require(cloud.rows.size() == cloud.size() || (cloud.rows.size() == 0 && cloud.skipped == 0),

@@ -1,4 +1,4 @@
-// VTK's XML for polygons: the points, also of unstructured grids, and meshes in the plane.
+// VTK's XML for polygons: the points, also of unstructured and structured grids, and meshes in the plane.
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -90,11 +90,19 @@ class VtkXmlPointsReader final : public VtkXmlReader {
     for (PointArray& begun : arrays_) {
       if (first_point() > 0 && begun.name == array.name && begun.components == array.components &&
           begun.values.size() == first_point() * begun.components) {
-        return ReadAnyNumbers(begun.values);
+        return ReadData(begun);
       }
     }
-    WELLSPACE_RETURN_IF_ERROR(ReadAnyNumbers(array.values));
     arrays_.push_back(std::move(array));
+    return ReadData(arrays_.back());
+  }
+
+  absl::Status ReadData(PointArray& array) {
+    WELLSPACE_RETURN_IF_ERROR(ReadAnyNumbers(array.values));
+    const uint64_t wanted = array.components * point_count();
+    if (xml().Attribute("type") == "Bit" && array.values.size() > wanted && array.values.size() - wanted < 8) {
+      array.values.resize(wanted);  // what fills the last byte
+    }
     return absl::OkStatus();
   }
 
@@ -168,6 +176,10 @@ absl::Status ReadVtp(InputFile& file, const CloudOptions& options, PointCloud& c
 
 absl::Status ReadVtuPoints(InputFile& file, const CloudOptions& options, PointCloud& cloud) {
   return ReadVtkXmlPoints(file, "UnstructuredGrid", options, cloud);
+}
+
+absl::Status ReadVts(InputFile& file, const CloudOptions& options, PointCloud& cloud) {
+  return ReadVtkXmlPoints(file, "StructuredGrid", options, cloud);
 }
 
 absl::StatusOr<Mesh> ReadVtpMesh(const std::string& path) {

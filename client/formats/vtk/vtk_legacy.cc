@@ -202,11 +202,13 @@ absl::Status VtkLegacyReader::ReadPoints() {
   return absl::OkStatus();
 }
 
-// Lines up to a blank one.
+// Lines up to a blank one; but names of components, a line each of the array before, may be blank.
 absl::Status VtkLegacyReader::SkipMetadata() {
   line_ = FieldSplitter("", ' ');
   has_pending_ = false;
-  for (std::string_view line; reader_.Next(line) && !TrimBlanks(line).empty();) {
+  uint64_t names = 0;
+  for (std::string_view line; reader_.Next(line) && (names > 0 || !TrimBlanks(line).empty());) {
+    names = TrimBlanks(line) == "COMPONENT_NAMES" ? components_ : names - std::min<uint64_t>(names, 1);
   }
   return reader_.status();
 }
@@ -314,6 +316,7 @@ absl::Status VtkLegacyReader::ReadField() {
     WELLSPACE_RETURN_IF_ERROR(TakeCount(kMaxCount, data.components));
     WELLSPACE_RETURN_IF_ERROR(TakeCount(kMaxCount, data.rows));
     if (TakeWordIf("string")) {
+      components_ = data.components;
       WELLSPACE_RETURN_IF_ERROR(SkipTexts(data.components * data.rows));
       continue;
     }
@@ -379,6 +382,7 @@ absl::Status VtkLegacyReader::ReadArray(uint64_t components, uint64_t rows, cons
         absl::StrCat("expected at most ", kVtkMaxNumbers, " numbers, got ", components, " times ", rows));
   }
   const uint64_t count = components * rows;
+  components_ = components;
   if (!is_ascii_) {
     line_ = FieldSplitter("", ' ');  // bytes start on the next one
   }

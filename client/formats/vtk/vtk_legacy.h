@@ -114,6 +114,7 @@ class VtkLegacyReader {
   Data::Of of_ = Data::Of::kFile;
   uint64_t point_count_ = 0;
   uint64_t data_count_ = 0;
+  uint64_t components_ = 0;  // of the array that was read last
 };
 
 }  // namespace wellspace::formats

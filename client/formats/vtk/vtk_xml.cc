@@ -8,6 +8,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "absl/strings/numbers.h"
 #include "client/formats/coordinate.h"
 #include "client/formats/io/number.h"
 #include "core/base/status_macros.h"
@@ -112,6 +113,13 @@ absl::Status VtkXmlReader::StartPiece() {
   ++pieces_;
   uint64_t points = 0;
   uint64_t cells = 0;
+  if (kind_ == "StructuredGrid") {
+    WELLSPACE_RETURN_IF_ERROR(TakeExtent(points, cells));
+    first_point_ = point_count_;
+    point_count_ += points;
+    cell_count_ += cells;
+    return absl::OkStatus();
+  }
   if (!ParseUnsigned(xml_.Attribute("NumberOfPoints"), kMaxCount - point_count_, points)) {
     return xml_.Error("expected NumberOfPoints below 2^32 in <Piece>");
   }
@@ -128,6 +136,32 @@ absl::Status VtkXmlReader::StartPiece() {
   first_point_ = point_count_;
   point_count_ += points;
   cell_count_ += cells;
+  return absl::OkStatus();
+}
+
+// "0 3 0 4 0 0": the first and the last point of each axis.
+absl::Status VtkXmlReader::TakeExtent(uint64_t& points, uint64_t& cells) const {
+  constexpr int64_t kLimit = std::numeric_limits<int32_t>::max();
+  std::array<int64_t, 6> ends{};
+  FieldSplitter fields(xml_.Attribute("Extent"), ' ');
+  points = 1;
+  cells = 1;
+  for (size_t i = 0; i < ends.size(); ++i) {
+    std::string_view field;
+    fields.Next(field);
+    if (!absl::SimpleAtoi(absl::string_view(field.data(), field.size()), &ends[i]) || ends[i] < -kLimit ||
+        ends[i] > kLimit || (i % 2 == 1 && ends[i] < ends[i - 1])) {
+      return xml_.Error("expected Extent in <Piece>, six whole numbers, of each axis first the lower one");
+    }
+    if (i % 2 == 1) {
+      const auto length = static_cast<uint64_t>(ends[i] - ends[i - 1]);
+      if (length + 1 > (kMaxCount - point_count_) / points) {
+        return xml_.Error("expected an Extent of fewer than 2^32 points in <Piece>");
+      }
+      points *= length + 1;
+      cells *= std::max<uint64_t>(length, 1);
+    }
+  }
   return absl::OkStatus();
 }
 
@@ -271,10 +305,19 @@ absl::Status VtkXmlReader::ReadAnyNumbers(std::vector<double>& values) {
   }
   if (type == "Float64") return ConvertWords<double>(bytes, values);
   if (type == "Float32") return ConvertWords<float>(bytes, values);
+  if (type == "Bit") {  // eight in a byte, the first as its highest bit
+    for (const char byte : bytes) {
+      for (int bit = 7; bit >= 0; --bit) {
+        values.push_back(byte >> bit & 1);
+      }
+    }
+    return absl::OkStatus();
+  }
   absl::Status status;
   return ConvertWhole(bytes, type, values, status)
              ? status
-             : xml_.Error(absl::StrCat("expected a type from Int8 to UInt64, Float32 or Float64, got ", Quote(type)));
+             : xml_.Error(
+                   absl::StrCat("expected Bit, a type from Int8 to UInt64, Float32 or Float64, got ", Quote(type)));
 }
 
 template <typename Value>

@@ -58,7 +58,8 @@ class VtkXmlReader {
   template <typename Value>
   absl::Status ReadArray(std::vector<Value>& values);
 
-  // The same for numbers of any type; those that are not finite stay as they are, or become NaN.
+  // The same for numbers of any type; those that are not finite stay as they are, or become NaN. Of Bit, up to seven
+  // more may come.
   absl::Status ReadAnyNumbers(std::vector<double>& values);
 
  private:
@@ -66,6 +67,7 @@ class VtkXmlReader {
   absl::Status StartElement();
   absl::Status StartFile();
   absl::Status StartPiece();
+  absl::Status TakeExtent(uint64_t& points, uint64_t& cells) const;
 
   // The text of the current element, an array; none if it has none.
   absl::Status TakeText(std::string_view& text);

@@ -453,8 +453,45 @@ TEST_F(PointFilesTest, VtpAndVtu) {
   EXPECT_THAT(ReadBad("a.vtp", Replaced(kVtp, "1.5 nan", "1.5"), kWithAttributes),
               HasSubstr("expected 1 values of \"heat\" for each of 2 points, got 1"));
   EXPECT_THAT(ReadBad("a.vtp", Replaced(kVtp, "UInt8", "UInt9"), kWithAttributes),
-              HasSubstr("a.vtp:1: expected a type from Int8 to UInt64, Float32 or Float64, got \"UInt9\""));
+              HasSubstr("a.vtp:1: expected Bit, a type from Int8 to UInt64, Float32 or Float64, got \"UInt9\""));
   ExpectCutAnywhereIsNoTrouble("a.vtp", kVtp);
+}
+
+// A grid whose points are all there, and bits, which fill bytes.
+TEST_F(PointFilesTest, StructuredGridsAndBits) {
+  const std::string text =
+      "<VTKFile type=\"StructuredGrid\" header_type=\"UInt32\"><StructuredGrid WholeExtent=\"0 1 0 1 2 2\">"
+      "<Piece Extent=\"0 1 0 1 2 2\"><PointData><DataArray type=\"Bit\" Name=\"b\" format=\"binary\">AQAAAKA="
+      "</DataArray></PointData><Points><DataArray type=\"Float32\" NumberOfComponents=\"3\" format=\"ascii\">0 0 1 1 0 "
+      "1 "
+      "0 1 1 1 1 2</DataArray></Points></Piece></StructuredGrid></VTKFile>";
+  const PointCloud cloud = ReadGood("a.vts", text, kWithAttributes);
+  EXPECT_THAT(cloud.points, ElementsAre(0, 0, 1, 1, 0, 1, 0, 1, 1, 1, 1, 2));
+  ASSERT_EQ(cloud.attributes.size(), 1);
+  EXPECT_THAT(cloud.attributes[0].values, ElementsAre(1, 0, 1, 0));
+  EXPECT_THAT(cloud.notes, ElementsAre(HasSubstr("1 cell is not used")));
+  for (const char* extent : {"", "0 1 0 1 2", "0 1 0 1 2 x", "1 0 0 1 2 2", "0 2147483647 0 2147483647 0 0"}) {
+    EXPECT_THAT(ReadBad("a.vts", Replaced(text, "Piece Extent=\"0 1 0 1 2 2", "Piece Extent=\""s + extent)),
+                HasSubstr("Extent"))
+        << extent;
+  }
+  EXPECT_THAT(ReadBad("a.vts", Replaced(text, "Piece Extent=\"0 1", "Piece Extent=\"0 2")),
+              HasSubstr("expected 18 coordinates for 6 points, got 12"));
+  ExpectCutAnywhereIsNoTrouble("a.vts", text);
+}
+
+// VTK names components line by line: those without a name are blank lines, which else end what it says of an array.
+TEST_F(PointFilesTest, BlankNamesOfComponents) {
+  const PointCloud cloud =
+      ReadGood("a.vtk",
+               "# vtk DataFile Version 5.1\nt\nASCII\nDATASET POLYDATA\nPOINTS 2 float\n0 0 1 1 0 2\n"
+               "METADATA\nCOMPONENT_NAMES\n\nnorth\n\nINFORMATION 0\n\nPOINT_DATA 2\nVECTORS v "
+               "float\n1 2 3 4 5 6\nMETADATA\nCOMPONENT_NAMES\nx\n\n\nINFORMATION 1\nNAME a LOCATION "
+               "b\nDATA 1 2\n\nSCALARS s int 1\nLOOKUP_TABLE default\n7\n8\n",
+               kWithAttributes);
+  EXPECT_THAT(cloud.points, ElementsAre(0, 0, 1, 1, 0, 2));
+  EXPECT_THAT(NamesOf(cloud), ElementsAre("v:0", "v:1", "v:2", "s"));
+  EXPECT_THAT(cloud.attributes[3].values, ElementsAre(7, 8));
 }
 
 // Points of meshes, whatever their elements are.

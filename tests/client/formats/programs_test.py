@@ -174,6 +174,54 @@ class Programs(unittest.TestCase):
                 shifts = numpy.repeat(numpy.arange(3), len(cells))[:, None] * len(points)
                 self.assert_mesh("pieces.vtu", numpy.tile(points, (3, 1)), numpy.tile(cells, (3, 1)) + shifts)
 
+    def test_we_read_points_of_vtk_with_arrays_of_any_type(self):
+        import vtk
+        grid_of_vtk = vtk.vtkStructuredGrid()
+        grid_of_vtk.SetDimensions(3, 4, 5)
+        points = vtk.vtkPoints()
+        for i in range(60):
+            points.InsertNextPoint(i % 3, i // 3 % 4, i // 12 + i / 8)
+        grid_of_vtk.SetPoints(points)
+        for name in ("Bit", "String", "Char", "UnsignedChar", "TypeUInt64", "IdType", "Double"):
+            array = getattr(vtk, f"vtk{name}Array")()
+            array.SetName(name)
+            for i in range(60):
+                array.InsertNextValue({"String": f"{i} <&\"", "Char": chr(65 + i % 2)}.get(name, i % 2))
+            grid_of_vtk.GetPointData().AddArray(array)
+        vectors = vtk.vtkDoubleArray()
+        vectors.SetName("v")
+        vectors.SetNumberOfComponents(3)
+        vectors.SetComponentName(1, "north")  # the others are blank
+        for i in range(60):
+            vectors.InsertNextTuple3(i, -i, i / 3)
+        grid_of_vtk.GetPointData().SetVectors(vectors)
+        mixed = vtk.vtkAppendFilter()
+        mixed.AddInputData(grid_of_vtk)
+        mixed.Update()
+        expected = numpy.array([points.GetPoint(i) for i in range(60)])
+        for data, writer, name in ((grid_of_vtk, vtk.vtkXMLStructuredGridWriter, "theirs.vts"),
+                                   (mixed.GetOutput(), vtk.vtkXMLUnstructuredGridWriter, "theirs.vtu")):
+            for mode in ("Ascii", "Binary", "Appended"):
+                with self.subTest(name=name, mode=mode):
+                    writer_of_vtk = writer()
+                    getattr(writer_of_vtk, f"SetDataModeTo{mode}")()
+                    self.write_by_vtk(writer_of_vtk, data, name)
+                    self.assert_cloud(name, expected)
+        for data, writer in ((grid_of_vtk, vtk.vtkStructuredGridWriter),
+                             (mixed.GetOutput(), vtk.vtkUnstructuredGridWriter)):
+            for version, file_type in itertools.product((42, 51), (1, 2)):
+                with self.subTest(writer=writer, version=version, file_type=file_type):
+                    writer_of_vtk = writer()
+                    writer_of_vtk.SetFileVersion(version)
+                    writer_of_vtk.SetFileType(file_type)
+                    self.write_by_vtk(writer_of_vtk, data, "theirs.vtk")
+                    self.assert_cloud("theirs.vtk", expected)
+
+    def write_by_vtk(self, writer, data, name):
+        writer.SetFileName(str(self.folder / name))
+        writer.SetInputData(data)
+        writer.Write()
+
     def assert_cloud(self, name, points, type="float64"):
         self.run_program(CONVERT_MESH, "--cloud", name, "cloud.npz")
         with numpy.load(self.folder / "cloud.npz") as cloud:
