@@ -63,8 +63,15 @@ class LasReader {
     uint64_t withheld = 0;
     for (uint64_t point = 0; point < count_; ++point) {
       if (reader_.Take(record.data(), record.size()) != record.size()) {
-        return EndError(
-            absl::StrCat("expected ", count_, " points of ", record_bytes_, " bytes, as the header says, got ", point));
+        if (!reader_.status().ok() || !options_.skip_invalid) {
+          return EndError(absl::StrCat("expected ", count_, " points of ", record_bytes_,
+                                       " bytes, as the header says, got ", point,
+                                       ", which --skip-invalid takes alone"));
+        }
+        cloud_.skipped += count_ - point;
+        cloud_.notes.push_back(
+            absl::StrCat(cloud_.name, ": the file ends after ", point, " of ", count_, " points, as its header says"));
+        break;
       }
       if (IsWithheld(record)) {
         ++withheld;

@@ -321,6 +321,18 @@ TEST_F(PointFilesTest, Las14WithInfrared) {
   EXPECT_THAT(of_first, ElementsAre(504, 9, 11, 200, -30, 3, 9, 0.5, 0, 0, 11, 12));
 }
 
+TEST_F(PointFilesTest, ACutLasIsReadAsFarAsItGoes) {
+  const std::string whole = Las(2, 0, {LasRecord(20, 4, 8, 12), LasRecord(20, 8, 0, 0), LasRecord(20, 0, 0, 0)});
+  const PointCloud cloud = ReadGood("a.las", whole.substr(0, whole.size() - 21), {.skip_invalid = true});
+  EXPECT_THAT(cloud.points, ElementsAre(1, 1002, 2003));
+  EXPECT_EQ(cloud.skipped, 2);
+  EXPECT_THAT(cloud.notes, ElementsAre(HasSubstr("the file ends after 1 of 3 points, as its header says"),
+                                       HasSubstr("2 points are left out, of which a coordinate is missing")));
+  EXPECT_THAT(ReadBad("a.las", whole.substr(0, whole.size() - 21)),
+              HasSubstr("got 1, which --skip-invalid takes alone"));
+  EXPECT_EQ(ReadGood("a.las", whole, {.skip_invalid = true}).skipped, 0);
+}
+
 TEST_F(PointFilesTest, LasErrors) {
   const std::string good = Las(2, 0, {LasRecord(20, 1, 2, 3)});
   const auto with = [&](size_t at, auto value) {
@@ -340,7 +352,8 @@ TEST_F(PointFilesTest, LasErrors) {
   EXPECT_THAT(with(96, uint32_t{10}), HasSubstr("a.las: byte 94: expected a header of at least 227 bytes"));
   EXPECT_THAT(with(96, uint32_t{4'000'000'000}), HasSubstr("from byte 4000000000 on; the file ends"));
   EXPECT_EQ(with(107, uint32_t{4'000'000'000}),
-            "a.las: byte 307: expected 4000000000 points of 20 bytes, as the header says, got 1; the file ends");
+            "a.las: byte 307: expected 4000000000 points of 20 bytes, as the header says, got 1, which "
+            "--skip-invalid takes alone; the file ends");
   EXPECT_THAT(with(131, std::numeric_limits<double>::infinity()),
               HasSubstr("a.las: byte 131: expected a finite scale other than 0 and a finite offset of coordinate 1, "
                         "got inf and "));
