@@ -165,6 +165,7 @@ std::span<const Format<SizeReader>> SizeReaders() {
       {"msh", {".msh"}, ReadOfMesh<ReadMsh>},
       {"npz", {".npz"}, ReadOfMesh<ReadNpz>},
       {"esri", {".asc"}, ReadRaster<ReadEsriGrid>},
+      {"geotiff", {".tif", ".tiff"}, ReadRaster<ReadGeoTiff>},
   };
   return readers;
 }

@@ -9,7 +9,9 @@
 //   npz   The same, with an array `h`; `simplices` may be missing.
 //   esri  ESRI's grid in ascii, .asc, of sizes in the plane: each cell has the size of its centre, those without data
 //         none, which is noted.
-// Tables and esri may be compressed by gzip.
+//   geotiff  GeoTIFF of one band, .tif, as esri: in strips or tiles, not compressed, by LZW, deflate or PackBits; whole
+//         or floating-point numbers. Its place is that of a tie point and a scale, or of a transformation.
+// Tables and rasters may be compressed by gzip.
 #ifndef WELLSPACE_CLIENT_FORMATS_READ_SIZES_H_
 #define WELLSPACE_CLIENT_FORMATS_READ_SIZES_H_
 

@@ -52,6 +52,14 @@ absl::Status CheckFrame(const std::string& name, const RasterFrame& frame);
 // Errors:     of opening and reading; INVALID_ARGUMENT at a line.
 absl::Status ReadEsriGrid(const std::string& path, SizedPoints& sized);
 
+// The first image of a GeoTIFF, of one band, in strips or tiles, not compressed, by LZW, deflate or PackBits; with a
+// tie point and a scale, or a transformation; nodata as GDAL has it (tag 42113).
+//
+// Guarantees: as of ReadEsriGrid; blocks that are left out have no data.
+// Memory:     the file, and the points.
+// Errors:     of opening and reading; INVALID_ARGUMENT.
+absl::Status ReadGeoTiff(const std::string& path, SizedPoints& sized);
+
 }  // namespace wellspace::formats
 
 #endif  // WELLSPACE_CLIENT_FORMATS_RASTER_RASTER_SIZES_H_

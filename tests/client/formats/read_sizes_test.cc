@@ -4,6 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,6 +18,7 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using std::string_literals::operator""s;
 
 class ReadSizesTest : public ::testing::Test {
  protected:
@@ -149,6 +153,91 @@ TEST_F(ReadSizesTest, WhatIsWrongInAnEsriGridIsToldWithItsLine) {
   EXPECT_THAT(refusal(" nan", " 1 1"), HasSubstr("s.asc:9: expected 6 cells, as the header says, got more"));
   EXPECT_THAT(refusal(" 4\n", " 0\n"), HasSubstr("s.asc[3]: size 0 is not allowed; a number above 0 is"));
   EXPECT_THAT(Refusal("s.asc", kEsriGrid, 3), HasSubstr("a raster has sizes in the plane"));
+}
+
+// A file of tests/data/formats.
+std::string RasterOfLibtiff(const std::string& name) {
+  const char* const folder = std::getenv("WELLSPACE_DATA_DIR");
+  std::ifstream file(std::string(folder == nullptr ? "tests/data" : folder) + "/formats/raster_" + name + ".tif",
+                     std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+// Rasters of 17 columns and 20 rows, written by libtiff 4.5: differences of int16 by LZW; float32 in tiles, by deflate
+// with the predictor of floating-point numbers; bytes by PackBits in the other byte order. The places are the same, but
+// that in the second those of centres are told.
+TEST_F(ReadSizesTest, OfAGeoTiffTheCentresOfItsCells) {
+  struct Case {
+    const char* name;
+    double scale;
+    double nodata;
+    double corner;  // half a cell, if places are those of corners
+  };
+  for (const Case& one :
+       {Case{"lzw", 1, 29, 0.5}, Case{"deflate_tiles", 0.125, 3.625, 0}, Case{"packbits_big", 1, 0, 0.5}}) {
+    SCOPED_TRACE(one.name);
+    const SizedPoints read = Read("s.tif", RasterOfLibtiff(one.name), 2);
+    size_t at = 0;
+    for (int cell = 0; cell < 17 * 20; ++cell) {
+      const int column = cell % 17;
+      const int row = cell / 17;
+      const double size = (1 + (column * 3 + row * 7) % 50) * one.scale;
+      if (size == one.nodata) {
+        continue;
+      }
+      ASSERT_LT(at, read.sizes.size());
+      EXPECT_EQ(read.sizes[at], size) << cell;
+      EXPECT_EQ(read.cloud.points[2 * at], 1000 + (column + one.corner) * 10) << cell;
+      EXPECT_EQ(read.cloud.points[2 * at + 1], 2000 - (row + one.corner) * 5) << cell;
+      EXPECT_EQ(read.cloud.Origin(at), folder_.Path("s.tif") + "[" + std::to_string(cell) + "]");
+      ++at;
+    }
+    EXPECT_EQ(at, read.sizes.size());
+    EXPECT_EQ(read.cloud.skipped, 340 - at);
+    EXPECT_EQ(read.cloud.notes.size(), at < 340 ? 1 : 0);
+  }
+}
+
+TEST_F(ReadSizesTest, WhatIsWrongInAGeoTiffIsTold) {
+  const std::string good = RasterOfLibtiff("lzw");
+  const auto word = [](const std::string& bytes, size_t at, size_t size) {
+    size_t value = 0;
+    for (size_t i = size; i-- > 0;) {
+      value = value << 8 | static_cast<uint8_t>(bytes[at + i]);
+    }
+    return value;
+  };
+  // With another value of a tag, or another tag in its place.
+  const auto refusal = [&](uint16_t tag, uint32_t value, uint16_t other = 0) {
+    std::string bytes = good;
+    const size_t directory = word(bytes, 4, 4);
+    for (size_t i = 0; i < word(bytes, directory, 2); ++i) {
+      const size_t entry = directory + 2 + 12 * i;
+      if (word(bytes, entry, 2) == tag) {
+        bytes.replace(entry + 8, 4, reinterpret_cast<const char*>(&value), 4);
+        bytes.replace(entry, 2, reinterpret_cast<const char*>(other == 0 ? &tag : &other), 2);
+      }
+    }
+    return Refusal("s.tif", bytes, 2);
+  };
+  EXPECT_THAT(Refusal("s.tif", "", 2), HasSubstr("expected a TIFF, which starts with II or MM"));
+  EXPECT_THAT(Refusal("s.tif", "II+\0\b\0\0\0"s, 2), HasSubstr("expected a TIFF of the version 42, got 43; gdal_"));
+  EXPECT_THAT(Refusal("s.tif", "II*\0\xff\0\0\0"s, 2),
+              HasSubstr("expected a directory within the 8 bytes of the file"));
+  EXPECT_THAT(refusal(256, 0), HasSubstr("expected fewer than 2^32 cells, at least one, got 0 columns and 20 rows"));
+  EXPECT_THAT(refusal(257, 0x7fffffff), HasSubstr("expected at most 1040 cells for each byte of the file"));
+  EXPECT_THAT(refusal(258, 12), HasSubstr("expected samples of 8, 16, 32 or 64 bits, floating-point ones of 32 or 64"));
+  EXPECT_THAT(refusal(339, 4), HasSubstr("got 16 bits of the format 4"));
+  EXPECT_THAT(refusal(259, 7), HasSubstr("expected no compression, LZW, deflate or PackBits, got the number 7; gdal_"));
+  EXPECT_THAT(refusal(259, 8), HasSubstr("block 0 does not decompress to 238 bytes by zlib"));
+  EXPECT_THAT(refusal(277, 3), HasSubstr("expected one band, got 3; gdal_translate -b 1 takes one"));
+  EXPECT_THAT(refusal(278, 5), HasSubstr("expected offsets and sizes of 4 blocks, got 3 and 3"));
+  EXPECT_THAT(refusal(317, 3), HasSubstr("expected the predictor 1 or 2, or 3 of floating-point samples, got 3"));
+  EXPECT_THAT(refusal(33550, 0, 33551), HasSubstr("expected a tie point (tag 33922) with a scale (33550), or a"));
+  EXPECT_THAT(Refusal("s.tif", good, 3), HasSubstr("a raster has sizes in the plane"));
+  for (size_t size = 0; size + 4 < good.size(); ++size) {  // the directory is at the end; then the place of another one
+    EXPECT_FALSE(ReadSizes(folder_.Write("s.tif", good.substr(0, size)), 2).ok()) << size;
+  }
 }
 
 }  // namespace
