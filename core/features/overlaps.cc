@@ -183,7 +183,7 @@ class OverlapFinder {
     std::set<uint32_t> open;                                // segments, by source
     std::set<std::pair<int32_t, uint32_t>> open_by_marker;  // but for sides of the box
     uint32_t open_rings = 0;
-    uint32_t open_polygons = GraphSegment::kNoPolygon;
+    uint32_t open_polygons = OddSets::kEmpty;
     uint64_t places = 0;  // so far
     for (size_t i = 0; i < ends.size(); ++i) {
       if (i % 1024 == 0) {
@@ -198,7 +198,7 @@ class OverlapFinder {
       }
       const uint32_t s = ends[i].segment;
       const GraphSegment& segment = graph_.segments[s];
-      open_polygons = graph_.JoinPolygons(open_polygons, segment.polygons);  // the second time it is taken out
+      open_polygons = graph_.polygons.Join(open_polygons, segment.polygons);  // the second time it is taken out
       if (ends[i].is_begin) {
         open.insert(s);
         open_rings += segment.rings;
@@ -207,7 +207,7 @@ class OverlapFinder {
       } else {
         open.erase(s);
         open_rings -= segment.rings;
-        open_polygons = open.empty() ? GraphSegment::kNoPolygon : open_polygons;
+        open_polygons = open.empty() ? OddSets::kEmpty : open_polygons;
         graph_.counts.touching_vertices += places;
       }
       if (!segment.IsBoxSide()) {

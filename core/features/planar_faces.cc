@@ -20,7 +20,7 @@
 namespace wellspace::core {
 namespace {
 
-constexpr uint32_t kNone = GraphSegment::kNoPolygon;
+constexpr uint32_t kNone = OddSets::kEmpty;
 
 // Half-edges that are sorted without a look at the context.
 constexpr std::ptrdiff_t kFewAround = 1024;

@@ -1,6 +1,7 @@
 #include "core/features/planar_graph.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <functional>
@@ -143,7 +144,7 @@ class GraphMaker {
   absl::Status TakeSegments() {
     const size_t inputs = graph_.point_of_input.size();
     WELLSPACE_ASSIGN_OR_RETURN(const std::vector<uint32_t> polygons, PolygonsOfSegments(features_, context_));
-    graph_.seeds = static_cast<uint32_t>(features_.seeds.size());
+    graph_.polygons = OddSets(static_cast<uint32_t>(features_.seeds.size()));
     for (size_t s = 0; s < features_.segment_count(); ++s) {
       WELLSPACE_RETURN_IF_ERROR(CheckAt(s));
       GraphSegment segment;
@@ -159,7 +160,7 @@ class GraphMaker {
       segment.marker = features_.markers.empty() ? 0 : features_.markers[s];
       segment.source = static_cast<uint32_t>(s);
       segment.rings = features_.is_open.empty() || features_.is_open[s] == 0 ? 1 : 0;
-      segment.polygons = polygons.empty() ? GraphSegment::kNoPolygon : polygons[s];
+      segment.polygons = polygons.empty() ? OddSets::kEmpty : polygons[s];
       if (segment.a == segment.b) {
         ++graph_.counts.empty_segments;
       } else {
@@ -220,7 +221,7 @@ class GraphMaker {
       // A side of the box keeps the marker of a segment along it.
       graph_.counts.duplicate_segments += next.IsBoxSide() ? 0 : 1;
       first.rings += next.rings;
-      first.polygons = graph_.JoinPolygons(first.polygons, next.polygons);
+      first.polygons = graph_.polygons.Join(first.polygons, next.polygons);
       is_dropped[order[k]] = true;
       std::swap(order[k - 1], order[k]);  // the next is compared with what stays
     }

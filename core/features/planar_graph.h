@@ -2,7 +2,6 @@
 #ifndef WELLSPACE_CORE_FEATURES_PLANAR_GRAPH_H_
 #define WELLSPACE_CORE_FEATURES_PLANAR_GRAPH_H_
 
-#include <array>
 #include <cstdint>
 #include <limits>
 #include <span>
@@ -11,6 +10,7 @@
 #include "absl/status/statusor.h"
 #include "core/base/run_context.h"
 #include "core/features/features.h"
+#include "core/features/odd_sets.h"
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
 
@@ -23,11 +23,9 @@ struct GraphSegment {
   uint32_t a = 0;  // points
   uint32_t b = 0;
   int32_t marker = 0;
-  uint32_t source = 0;             // the first given segment that it is a part of, or a side of the box
-  uint32_t rings = 1;              // so many ring segments lie on it
-  uint32_t polygons = kNoPolygon;  // whose ring it is a part of: see PlanarGraph::PolygonsOf
-
-  static constexpr uint32_t kNoPolygon = std::numeric_limits<uint32_t>::max();
+  uint32_t source = 0;                  // the first given segment that it is a part of, or a side of the box
+  uint32_t rings = 1;                   // so many ring segments lie on it
+  uint32_t polygons = OddSets::kEmpty;  // whose rings an odd number of times lie on it: a set of PlanarGraph::polygons
 
   bool IsBoxSide() const { return source >= kBoxSide; }
 };
@@ -52,19 +50,9 @@ struct PlanarGraph {
   std::vector<uint32_t> input_of_point;  // the first given point there; kNoInput for those made here
   std::vector<GraphSegment> segments;    // by source, then along it from its lower end to its higher one
   CleaningCounts counts;
-  // GraphSegment::polygons below `seeds` is the one seed with that number; others are two of these together.
-  uint32_t seeds = 0;
-  std::vector<std::array<uint32_t, 2>> joined_polygons;
+  OddSets polygons;  // of seeds
 
   static constexpr uint32_t kNoInput = std::numeric_limits<uint32_t>::max();
-
-  // The seeds of the polygons of which an odd number of ring segments lies on `segment`, ascending: crossing it leads
-  // into these or out of them.
-  //
-  // Complexity: O(k log k), k of them and of those that are on it an even number of times.
-  std::vector<uint32_t> PolygonsOf(const GraphSegment& segment) const;
-  // What GraphSegment::polygons of two segments that become one is.
-  uint32_t JoinPolygons(uint32_t one, uint32_t other);
 };
 
 // Makes a planar graph of the segments of `features` over `points`, n x 2; by exact signs alone, but for

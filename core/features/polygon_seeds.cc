@@ -3,93 +3,22 @@
 #include <algorithm>
 #include <cstddef>
 #include <numeric>
-#include <queue>
 #include <set>
 #include <tuple>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
+#include "core/features/face_walk.h"
+#include "core/features/odd_sets.h"
 #include "core/features/place.h"
 #include "core/geometry/segment.h"
 
 namespace wellspace::core {
 namespace {
 
-constexpr uint32_t kOfNoPolygon = GraphSegment::kNoPolygon;
+constexpr uint32_t kOfNoPolygon = OddSets::kEmpty;
 constexpr uint32_t kStepsBetweenLooks = 1024;
-
-// Goes from face to face, over a tree of segments that it crosses there and back.
-class FaceWalk {
- public:
-  FaceWalk(const PlanarGraph& graph, const PlanarFaces& faces, const RunContext& context)
-      : graph_(graph), faces_(faces), context_(context), first_side_(faces.faces.size() + 1) {
-    for (const uint32_t face : faces.left_face) {
-      ++first_side_[face + 1];
-    }
-    std::partial_sum(first_side_.begin(), first_side_.end(), first_side_.begin());
-    sides_.resize(faces.left_face.size());
-    std::vector<uint32_t> next(first_side_.begin(), first_side_.end() - 1);
-    for (HalfEdge h = 0; h < sides_.size(); ++h) {
-      sides_[next[faces.left_face[h]]++] = h;
-    }
-  }
-
-  // Calls visit(face, its half-edges) for each face, in the unbounded one first, and toggle(polygon) for each polygon
-  // whose ring is crossed on the way there from the face before.
-  template <typename Toggle, typename Visit>
-  absl::Status Run(const Toggle& toggle, const Visit& visit) const {
-    struct Stop {
-      uint32_t face;
-      HalfEdge entered_by;
-      uint32_t next;
-    };
-    std::vector<bool> is_visited(faces_.faces.size());
-    std::vector<Stop> way;
-    uint32_t steps = 0;
-    const auto cross = [&](HalfEdge h) {
-      for (const uint32_t polygon : graph_.PolygonsOf(graph_.segments[SegmentOf(h)])) {
-        toggle(polygon);
-        ++steps;
-      }
-    };
-    const auto enter = [&](uint32_t face, HalfEdge by) {
-      is_visited[face] = true;
-      way.push_back({face, by, first_side_[face]});
-      return visit(face, std::span<const HalfEdge>(sides_).subspan(first_side_[face],
-                                                                   first_side_[face + 1] - first_side_[face]));
-    };
-    WELLSPACE_RETURN_IF_ERROR(enter(0, 0));
-    while (!way.empty()) {
-      if (++steps >= kStepsBetweenLooks) {
-        steps = 0;
-        WELLSPACE_RETURN_IF_ERROR(context_.Check());
-      }
-      Stop& here = way.back();
-      if (here.next == first_side_[here.face + 1]) {
-        const HalfEdge back = here.entered_by;
-        way.pop_back();
-        if (!way.empty()) {
-          cross(back);
-        }
-        continue;
-      }
-      const HalfEdge h = sides_[here.next++];
-      if (const uint32_t beyond = faces_.left_face[TwinOf(h)]; !is_visited[beyond]) {
-        cross(h);
-        WELLSPACE_RETURN_IF_ERROR(enter(beyond, h));
-      }
-    }
-    return absl::OkStatus();
-  }
-
- private:
-  const PlanarGraph& graph_;
-  const PlanarFaces& faces_;
-  const RunContext& context_;
-  std::vector<uint32_t> first_side_;  // by face, in sides_
-  std::vector<HalfEdge> sides_;       // by the face on their left
-};
 
 // A segment that bounds a polygon, which lies to the left of it.
 struct Side {
@@ -154,43 +83,6 @@ Ranks RanksOf(std::span<const FaceSeed> seeds, const std::vector<double>& areas)
 }
 
 }  // namespace
-
-std::vector<uint32_t> PlanarGraph::PolygonsOf(const GraphSegment& segment) const {
-  std::vector<uint32_t> found;
-  if (segment.polygons == GraphSegment::kNoPolygon) {
-    return found;
-  }
-  // Those that two are joined of have lower numbers, so that each comes up as often as it is there, at once.
-  std::priority_queue<uint32_t> pending;
-  pending.push(segment.polygons);
-  while (!pending.empty()) {
-    const uint32_t one = pending.top();
-    bool is_odd = false;
-    for (; !pending.empty() && pending.top() == one; pending.pop()) {
-      is_odd = !is_odd;
-    }
-    if (is_odd && one < seeds) {
-      found.push_back(one);
-    } else if (is_odd) {
-      for (const uint32_t part : joined_polygons[one - seeds]) {
-        pending.push(part);
-      }
-    }
-  }
-  std::reverse(found.begin(), found.end());
-  return found;
-}
-
-uint32_t PlanarGraph::JoinPolygons(uint32_t one, uint32_t other) {
-  if (one == other) {
-    return GraphSegment::kNoPolygon;  // in and out again
-  }
-  if (one == GraphSegment::kNoPolygon || other == GraphSegment::kNoPolygon) {
-    return std::min(one, other);
-  }
-  joined_polygons.push_back({one, other});
-  return static_cast<uint32_t>(seeds + joined_polygons.size() - 1);
-}
 
 absl::StatusOr<std::vector<uint32_t>> PolygonsOfSegments(const Features& features, const RunContext& context) {
   std::vector<uint32_t> polygons;
@@ -265,6 +157,7 @@ absl::StatusOr<std::vector<uint32_t>> FindPolygonsOfFaces(const PlanarGraph& gra
     return found;
   }
   const FaceWalk walk(graph, faces, context);
+  const auto of_segment = [](const GraphSegment& segment) { return segment.polygons; };
   std::set<uint32_t> inside;  // the polygons around the face
   std::vector<Side> sides;
   bool have_areas_a_say = false;
@@ -273,43 +166,44 @@ absl::StatusOr<std::vector<uint32_t>> FindPolygonsOfFaces(const PlanarGraph& gra
       set.insert(one);
     }
   };
-  WELLSPACE_RETURN_IF_ERROR(walk.Run([&](uint32_t polygon) { toggle_in(inside, polygon); },
-                                     [&](uint32_t face, std::span<const HalfEdge> half_edges) {
-                                       have_areas_a_say = have_areas_a_say || inside.size() > 1;
-                                       if (!inside.empty()) {
-                                         found[face] = *inside.begin();
-                                       }
-                                       for (const HalfEdge h : half_edges) {
-                                         for (const uint32_t p : graph.PolygonsOf(graph.segments[SegmentOf(h)])) {
-                                           if (inside.contains(p)) {
-                                             sides.push_back({p, h});
-                                           }
-                                         }
-                                       }
-                                       return absl::OkStatus();
-                                     }));
+  WELLSPACE_RETURN_IF_ERROR(walk.Run(
+      graph.polygons, of_segment, [&](uint32_t polygon) { toggle_in(inside, polygon); },
+      [&](uint32_t face, std::span<const HalfEdge> half_edges) {
+        have_areas_a_say = have_areas_a_say || inside.size() > 1;
+        if (!inside.empty()) {
+          found[face] = *inside.begin();
+        }
+        for (const HalfEdge h : half_edges) {
+          for (const uint32_t p : graph.polygons.MembersOf(graph.segments[SegmentOf(h)].polygons)) {
+            if (inside.contains(p)) {
+              sides.push_back({p, h});
+            }
+          }
+        }
+        return absl::OkStatus();
+      }));
   if (!have_areas_a_say) {
     return found;
   }
   const Ranks ranks = RanksOf(seeds, AreasOf(graph, sides, seeds.size()));
   std::set<uint32_t> around;  // the same, by rank
-  WELLSPACE_RETURN_IF_ERROR(walk.Run([&](uint32_t polygon) { toggle_in(around, ranks.rank[polygon]); },
-                                     [&](uint32_t face, std::span<const HalfEdge> half_edges) -> absl::Status {
-                                       if (around.empty()) {
-                                         return absl::OkStatus();
-                                       }
-                                       const uint32_t least = found[face] = ranks.seed[*around.begin()];
-                                       const uint32_t last =
-                                           ranks.seed[*std::prev(around.lower_bound(ranks.area_end[*around.begin()]))];
-                                       if (seeds[least].SaysTheSameAs(seeds[last])) {
-                                         return absl::OkStatus();
-                                       }
-                                       const GraphSegment& beside = graph.segments[SegmentOf(half_edges[0])];
-                                       return absl::InvalidArgumentError(absl::StrCat(
-                                           "seeds[", std::min(least, last), "] and seeds[", std::max(least, last),
-                                           "]: their polygons have one area, lie over each other at ",
-                                           PlaceText(graph.points[beside.a]), ", and differ; leave one out"));
-                                     }));
+  WELLSPACE_RETURN_IF_ERROR(walk.Run(
+      graph.polygons, of_segment, [&](uint32_t polygon) { toggle_in(around, ranks.rank[polygon]); },
+      [&](uint32_t face, std::span<const HalfEdge> half_edges) -> absl::Status {
+        if (around.empty()) {
+          return absl::OkStatus();
+        }
+        const uint32_t least = found[face] = ranks.seed[*around.begin()];
+        const uint32_t last = ranks.seed[*std::prev(around.lower_bound(ranks.area_end[*around.begin()]))];
+        if (seeds[least].SaysTheSameAs(seeds[last])) {
+          return absl::OkStatus();
+        }
+        const GraphSegment& beside = graph.segments[SegmentOf(half_edges[0])];
+        return absl::InvalidArgumentError(
+            absl::StrCat("seeds[", std::min(least, last), "] and seeds[", std::max(least, last),
+                         "]: their polygons have one area, lie over each other at ", PlaceText(graph.points[beside.a]),
+                         ", and differ; leave one out"));
+      }));
   return found;
 }
 

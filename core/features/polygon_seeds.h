@@ -10,12 +10,13 @@
 #include "absl/status/statusor.h"
 #include "core/base/run_context.h"
 #include "core/features/features.h"
+#include "core/features/odd_sets.h"
 #include "core/features/planar_faces.h"
 #include "core/features/planar_graph.h"
 
 namespace wellspace::core {
 
-// The seed whose polygon each segment is of, or GraphSegment::kNoPolygon; empty if no seed has a polygon.
+// The seed whose polygon each segment is of, or OddSets::kEmpty; empty if no seed has a polygon.
 //
 // Complexity: O(m + s log s).
 // Errors:     INVALID_ARGUMENT, naming seeds and segments: a segment that is not there, or is of two polygons.
@@ -32,7 +33,7 @@ absl::Status CheckPolygonsClosed(std::span<const uint32_t> point_of_input, const
                                  const RunContext& context);
 
 // For each face of `faces` the seed whose polygon has it: of those that hold it the one of least area; or
-// GraphSegment::kNoPolygon. It does not depend on the order of segments and seeds.
+// OddSets::kEmpty. It does not depend on the order of segments and seeds.
 //
 // REQUIRES:   left_face is known of both sides of every segment, and the rings of polygons are closed.
 // Complexity: O((f + k) log k), k the sum over all segments of the polygons that they bound.
