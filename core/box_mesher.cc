@@ -36,7 +36,7 @@ absl::Status BoxMesher<D>::Build(const MeshParameters& parameters, const Input& 
   merge_distance_ = parameters.merge_distance;
   WELLSPACE_ASSIGN_OR_RETURN(const MergedPoints merged, SetBox(parameters, points, context));
   meshed_box_ = domain_.box;
-  WELLSPACE_RETURN_IF_ERROR(samples_.Take(domain_, meshed_box_, parameters, context));
+  WELLSPACE_RETURN_IF_ERROR(samples_.Take(domain_, parameters, context));
   WELLSPACE_RETURN_IF_ERROR(CheckShapeFeasible<D>(domain_, parameters, points.size() / D));
   absl::StatusOr<SortedCloud<D>> cloud = SortAndBuild(parameters, points, merged, context);
   if (IsTooClose(cloud.status())) {

@@ -116,7 +116,10 @@ struct NamedSize {
   }
 };
 
-NamedSize FinestSize(const MeshParameters& parameters, const LargestArea& area) {
+// `growth`: of sizes from samples, which may lie outside of the domain.
+template <int D>
+NamedSize FinestSize(const Domain<D>& domain, const MeshParameters& parameters, double growth,
+                     const LargestArea& area) {
   const double edge = CircumradiusOf(1, parameters.dimension);
   double finest = BoundEverywhere(parameters);
   NamedSize named{absl::StrFormat("max_circumradius: %g", parameters.max_circumradius)};
@@ -134,10 +137,18 @@ NamedSize FinestSize(const MeshParameters& parameters, const LargestArea& area) 
     }
   }
   if (const SizeSamples* samples = parameters.size_samples.get(); samples != nullptr && !samples->sizes.empty()) {
-    const auto least = std::min_element(samples->sizes.begin(), samples->sizes.end());
     const double unit = samples->measure == SizeMeasure::kEdgeLength ? edge : 1;
-    if (unit * *least < finest) {
-      named = {absl::StrFormat("size_samples.sizes[%d]: %g", least - samples->sizes.begin(), *least), unit};
+    for (size_t i = 0; i < samples->sizes.size(); ++i) {
+      if (unit * samples->sizes[i] >= finest) {
+        continue;
+      }
+      const Point<D> p = domain.Scaled(PointAt<D>(samples->points, i));
+      const double size =
+          unit * samples->sizes[i] + growth * std::sqrt(DistanceSq<D>(p, domain.scaled_box)) / domain.scale;
+      if (size < finest) {
+        finest = size;
+        named = {absl::StrFormat("size_samples.sizes[%d]: %g", i, samples->sizes[i]), unit};
+      }
     }
   }
   return named;
@@ -208,7 +219,7 @@ absl::Status CheckSizesFeasible(const Shape& shape, const Domain<D>& domain, con
     return absl::OkStatus();
   }
   const double size = SmallestSizeFor(shape, sizes, VerticesLeft<D>(most, vertices));
-  const NamedSize finest = FinestSize(parameters, area);
+  const NamedSize finest = FinestSize<D>(domain, parameters, sizes.growth().of_samples, area);
   return TooFine<D>(finest.name, TypicalVerticesForSizes(shape, sizes), least, most,
                     absl::StrCat("the smallest size that fits is about ", RoundedUp(finest.Of(size / domain.scale))));
 }

@@ -29,7 +29,7 @@ struct MeshParameters {
   // Boxes in which circumradii are smaller still. Away from a box, sizes grow no faster than the gradation times the
   // distance from it.
   std::vector<SizeBox> size_boxes{};
-  // Points in the domain at which they are: a simplex with circumcentre c has a circumradius of at most
+  // Points at which they are, in the domain or not: a simplex with circumcentre c has a circumradius of at most
   // size + gradation * (distance of c), for each of them. Null for none.
   std::shared_ptr<const SizeSamples> size_samples{};
   // How fast circumradii may grow with the distance. Above 0 and at most 1. 0 means 1 from boxes, and

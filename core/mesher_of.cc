@@ -82,7 +82,7 @@ absl::Status MesherOf<Kind>::Refine(const MeshParameters& parameters, RunContext
   {
     const Stopwatch stopwatch(figures_.refinement_seconds, figures_.simplices_seconds);
     WELLSPACE_RETURN_IF_ERROR(AllowSamples<D>(parameters, samples_, memory_bytes(), context));
-    WELLSPACE_RETURN_IF_ERROR(samples_.Take(domain_, meshed_box_, parameters, context));
+    WELLSPACE_RETURN_IF_ERROR(samples_.Take(domain_, parameters, context));
     is_refined_ = false;
     ForgetMade();
     const MeshCriteria<D> criteria = CriteriaOf(parameters);

@@ -79,7 +79,7 @@ absl::Status PlaneMesher::Build(const MeshParameters& parameters, const Input& i
   WELLSPACE_RETURN_IF_ERROR(BuildTree(parameters, "points of the domain", made.cloud, planar_->Ends(), context));
   meshed_box_.low = meshed_box_.high = domain_.Unscaled(structure_.point(VertexId{0}));
   NoteAddedFrom(0);
-  WELLSPACE_RETURN_IF_ERROR(samples_.Take(domain_, meshed_box_, parameters, context));
+  WELLSPACE_RETURN_IF_ERROR(samples_.Take(domain_, parameters, context));
   placer_.emplace(domain_, structure_, *planar_);
   return absl::OkStatus();
 }

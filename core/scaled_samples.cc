@@ -5,8 +5,6 @@
 #include <utility>
 #include <vector>
 
-#include "absl/strings/str_cat.h"
-#include "absl/strings/str_join.h"
 #include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
 
@@ -17,15 +15,31 @@ namespace {
 // mean the same as these, and squares of them are neither 0 nor infinite.
 constexpr double kFarBeyond = 0x1p400;
 
-constexpr size_t kSamplesBetweenChecks = 1 << 14;
+// A sample that is farther from the domain than so many of its longest sides is taken to be as far as that: no size at
+// such a distance says anything there, and squares of it are no infinity.
+constexpr double kFarAway = 0x1p60;
+
+template <int D>
+Point<D> Within(const Box<D>& box, Point<D> p) {
+  for (int axis = 0; axis < D; ++axis) {
+    p[axis] = std::clamp(p[axis], box.low[axis], box.high[axis]);
+  }
+  return p;
+}
 
 template <int D>
 std::shared_ptr<const SampleTree<D>> MakeTree(const Domain<D>& domain, const SizeSamples& samples) {
+  const double reach = kFarAway * domain.scaled_box.LongestSide();
+  Box<D> far = domain.scaled_box;
+  for (int axis = 0; axis < D; ++axis) {
+    far.low[axis] -= reach;
+    far.high[axis] += reach;
+  }
   std::vector<SizedPlace<Point<D>>> places(samples.sizes.size());
   for (size_t i = 0; i < places.size(); ++i) {
     const double size =
         samples.measure == SizeMeasure::kEdgeLength ? CircumradiusOf(samples.sizes[i], D) : samples.sizes[i];
-    places[i] = {domain.Scaled(PointAt<D>(samples.points, i)), ScaledSize(size, domain.scale)};
+    places[i] = {Within<D>(far, domain.Scaled(PointAt<D>(samples.points, i))), ScaledSize(size, domain.scale)};
   }
   return std::make_shared<const SampleTree<D>>(std::move(places));
 }
@@ -35,7 +49,7 @@ std::shared_ptr<const SampleTree<D>> MakeTree(const Domain<D>& domain, const Siz
 double ScaledSize(double size, double scale) { return std::clamp(size * scale, 1 / kFarBeyond, kFarBeyond); }
 
 template <int D>
-absl::Status ScaledSamples<D>::Take(const Domain<D>& domain, const Box<D>& box, const MeshParameters& parameters,
+absl::Status ScaledSamples<D>::Take(const Domain<D>& domain, const MeshParameters& parameters,
                                     const RunContext& context) {
   if (parameters.size_samples == taken_) {
     return absl::OkStatus();
@@ -45,19 +59,8 @@ absl::Status ScaledSamples<D>::Take(const Domain<D>& domain, const Box<D>& box, 
     tree_ = nullptr;
     return absl::OkStatus();
   }
-  const SizeSamples& samples = *parameters.size_samples;
-  for (size_t i = 0; i < samples.sizes.size(); ++i) {
-    if (i % kSamplesBetweenChecks == 0) {
-      WELLSPACE_RETURN_IF_ERROR(context.Check());
-    }
-    const Point<D> p = PointAt<D>(samples.points, i);
-    if (!box.Contains(p)) {
-      return absl::InvalidArgumentError(absl::StrCat(
-          "size_samples.points[", i, "]: (", absl::StrJoin(p, ", "), ") lies outside the domain from (",
-          absl::StrJoin(box.low, ", "), ") to (", absl::StrJoin(box.high, ", "), "); only points in it have a size"));
-    }
-  }
-  tree_ = MakeTree<D>(domain, samples);
+  WELLSPACE_RETURN_IF_ERROR(context.Check());
+  tree_ = MakeTree<D>(domain, *parameters.size_samples);
   taken_ = parameters.size_samples;
   return absl::OkStatus();
 }

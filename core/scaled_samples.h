@@ -24,13 +24,13 @@ double ScaledSize(double size, double scale);
 template <int D>
 class ScaledSamples {
  public:
-  // Takes those of `parameters`, unless it has them. `box`, not scaled, is what is meshed.
+  // Takes those of `parameters`, unless it has them. They may lie outside of what is meshed: from there, too, sizes
+  // grow.
   //
   // REQUIRES:   ValidateParameters(parameters).ok().
   // Complexity: O(n log n) for n new samples.
-  // Errors:     INVALID_ARGUMENT, naming the first sample outside the box; CANCELLED, DEADLINE_EXCEEDED.
-  absl::Status Take(const Domain<D>& domain, const Box<D>& box, const MeshParameters& parameters,
-                    const RunContext& context);
+  // Errors:     CANCELLED, DEADLINE_EXCEEDED.
+  absl::Status Take(const Domain<D>& domain, const MeshParameters& parameters, const RunContext& context);
 
   // Those of `parameters`, which are built here and now if they were not taken. Null for none.
   std::shared_ptr<const SampleTree<D>> Of(const Domain<D>& domain, const MeshParameters& parameters) const;

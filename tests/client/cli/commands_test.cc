@@ -431,9 +431,6 @@ TEST_F(CommandsTest, SizesAtPointsAreReadKeptAndChecked) {
       1);
 
   // What is wrong is named by the row of the file.
-  folder_.Write("sizes.csv", "x,y,h\n0.25,0.25,0.01\n5,0.75,0.02\n");
-  EXPECT_THAT(MeshFails("cloud.csv", kPlane, 2, options),
-              HasSubstr("--size-field " + sizes + ":3: size_samples.points[1]: (5, 0.75) lies outside the domain"));
   folder_.Write("sizes.csv", "x,y,h\n0.25,0.25,0.01\n0.5,0.75,0\n");
   EXPECT_THAT(MeshFails("cloud.csv", kPlane, 2, options), HasSubstr(sizes + ":3: size 0 is not allowed"));
   EXPECT_THAT(MeshFails("cloud.csv", kPlane, 2, {"--gradation", "1.5"}), HasSubstr("--gradation: gradation: 1.5 is"));

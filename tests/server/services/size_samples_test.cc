@@ -143,8 +143,6 @@ TEST_F(SizeSamplesTest, WrongOnesAreNamed) {
   ExpectRefused({Samples({0.5, 0.5}, {nan})}, "INVALID_SIZES", "size_samples.sizes", "size_samples.sizes[0]: nan");
   ExpectRefused({good, Samples({0.5, nan}, {1})}, "INVALID_SIZES", "size_samples.points",
                 "size_samples.points[2]: coordinate 1 is nan");
-  ExpectRefused({good, Samples({0.5, 1.5}, {1})}, "INVALID_SIZES", "size_samples.points",
-                "size_samples.points[2]: (0.5, 1.5) lies outside the domain from (0, 0) to (1, 1)");
   ExpectRefused({good, Samples({0.5}, {1})}, "INVALID_CHUNK_SHAPE", "size_samples.points",
                 "the chunk of sizes after sample 2 has 1 coordinates for 1 sizes; expected 2 for each");
   ExpectRefused({Samples({0.5, 0.5}, {})}, "INVALID_CHUNK_SHAPE", "size_samples.points", "after sample 0");

@@ -22,8 +22,9 @@ _UNITS = {"radius": 1, "edge": 2}  # of the service: SizeMeasure
 class SizeArguments(TypedDict, total=False):
     """
     size_points : (m, d) float
-        Points of the domain that have a size each. The bound on the circumradius of a simplex is the least, over all of
-        them, of the size plus `gradation` times the distance of the circumcentre. In any order. Default: none.
+        Points that have a size each, in the domain or outside of it. The bound on the circumradius of a simplex is the
+        least, over all of them, of the size plus `gradation` times the distance of the circumcentre. In any order.
+        Default: none.
     size_values : (m,) float
         Their sizes, above 0. In the unit of the points.
     size_unit : {"radius", "edge"}
