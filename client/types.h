@@ -42,7 +42,7 @@ struct VertexSizes {
 };
 
 // Which faces, into which segments cut the plane, are meshed; see the proto's FaceRule.
-enum class FaceRule { kBox, kHoles, kEvenOdd };
+enum class FaceRule { kBox, kHoles, kEvenOdd, kUnion };
 
 // What becomes of segments that cross, and of points too near to a segment; see the proto's CrossingRule.
 enum class CrossingRule { kRefuse, kSnap, kSplit };
@@ -65,9 +65,11 @@ struct Features {
   std::vector<uint32_t> ends;    // m x 2, row-major: indices of points
   std::vector<int32_t> markers;  // m, or none: then all are 0
   std::vector<uint8_t> is_open;  // m, or none: 1 for a segment that is part of no ring
+  std::vector<uint32_t> groups;  // m, or none: the group of each, for kUnion
   std::vector<FaceSeed> seeds;
   FaceRule faces = FaceRule::kBox;
   CrossingRule crossings = CrossingRule::kRefuse;
+  std::optional<double> snap_distance{};  // of kSnap and kSplit; none: what doubles cannot serve
 };
 
 // What to mesh and how. What is empty is the server's default, as the comments of the proto's MeshParameters say. A 0
@@ -131,6 +133,8 @@ struct DomainStatistics {
   uint64_t near_points = 0;
   uint64_t exempt_simplices = 0;
   double min_input_angle_deg = 0;
+  uint64_t unused_seeds = 0;
+  uint64_t first_unused_seed = 0;
 };
 
 // What was done against slivers; see the proto's SliverStatistics.
@@ -271,6 +275,7 @@ struct Session {
   uint64_t seed_count = 0;
   std::optional<FaceRule> faces;  // none: a cloud, without segments and faces
   CrossingRule crossings = CrossingRule::kRefuse;
+  std::optional<double> snap_distance{};
   uint64_t size_count = 0;    // samples of sizes, see SetSizes
   uint64_t stored_bytes = 0;  // of what it keeps
 };

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <numeric>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "core/base/status_macros.h"
 #include "core/features/planar_faces.h"
 #include "core/features/planar_graph.h"
+#include "core/near_points.h"
 
 namespace wellspace::core {
 namespace {
@@ -50,6 +52,31 @@ absl::StatusOr<MeshedPoints> TakeMeshedPoints(const PlanarGraph& graph, const Pl
   return taken;
 }
 
+absl::StatusOr<PointMerge> MergePoints(const Domain<2>& domain, std::span<const double> points, double distance,
+                                       const RunContext& context) {
+  WELLSPACE_ASSIGN_OR_RETURN(MergedPoints merged, MergeNear<2>(domain, points, distance, context));
+  for (uint32_t& place : merged.place_of) {
+    place = merged.inputs[place];
+  }
+  return PointMergeOf(points, merged.place_of, context);
+}
+
+// Refuses points that have stayed, and that the box cannot have: others may have lain outside of it.
+absl::Status CheckMerged(const Box<2>& box, std::span<const double> points, const PointMerge& merge,
+                         const RunContext& context) {
+  WELLSPACE_ASSIGN_OR_RETURN(const Domain<2> domain, Domain<2>::Of(box));
+  for (size_t k = 0; k < merge.inputs.size(); ++k) {
+    if (k % kStepsBetweenChecks == 0) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+    }
+    const Point<2> p = PointAt<2>(points, merge.inputs[k]);
+    if (!IsServed<2>(domain.box, p, domain.Scaled(p), 1 / domain.scale)) {
+      return PointError<2>(domain, p, merge.inputs[k]);
+    }
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 uint64_t DomainCloudBytes(uint64_t points, uint64_t segments, uint64_t seeds) {
@@ -57,9 +84,10 @@ uint64_t DomainCloudBytes(uint64_t points, uint64_t segments, uint64_t seeds) {
 }
 
 absl::StatusOr<DomainCloud> MakeDomainCloud(std::span<const double> points, const Features& features, const Box<2>& box,
-                                            uint64_t max_vertices, int threads, const RunContext& context) {
+                                            double merge_distance, uint64_t max_vertices, int threads,
+                                            const RunContext& context) {
   const bool is_in_box = features.faces == FaceRule::kBox;
-  if (is_in_box) {
+  if (is_in_box && merge_distance == 0) {
     WELLSPACE_ASSIGN_OR_RETURN(const Domain<2> given, Domain<2>::Of(box));
     WELLSPACE_RETURN_IF_ERROR(CheckPoints<2>(given, points, context));
   }
@@ -74,9 +102,17 @@ absl::StatusOr<DomainCloud> MakeDomainCloud(std::span<const double> points, cons
   }
   WELLSPACE_ASSIGN_OR_RETURN(const Domain<2> domain, Domain<2>::Of(around));
   WELLSPACE_RETURN_IF_ERROR(CheckPoints<2>(domain, points, context));
-  WELLSPACE_ASSIGN_OR_RETURN(PlanarGraph graph,
-                             MakePlanarGraph(points, features, is_in_box ? &box : nullptr,
-                                             domain.MinSeparation() / domain.scale, max_vertices, threads, context));
+  const double least_separation = domain.MinSeparation() / domain.scale;
+  std::optional<PointMerge> merge;
+  if (merge_distance > 0) {
+    WELLSPACE_ASSIGN_OR_RETURN(merge, MergePoints(domain, points, std::max(merge_distance, least_separation), context));
+    if (is_in_box) {
+      WELLSPACE_RETURN_IF_ERROR(CheckMerged(box, points, *merge, context));
+    }
+  }
+  WELLSPACE_ASSIGN_OR_RETURN(
+      PlanarGraph graph, MakePlanarGraph(points, features, is_in_box ? &box : nullptr, least_separation, max_vertices,
+                                         threads, context, std::move(merge)));
   // Crossings may have made many more of them.
   WELLSPACE_RETURN_IF_ERROR(
       context.AllowMemory(DomainCloudBytes(graph.points.size(), graph.segments.size(), features.seeds.size())));

@@ -31,14 +31,16 @@ struct DomainCloud {
 uint64_t DomainCloudBytes(uint64_t points, uint64_t segments, uint64_t seeds);
 
 // Cleans points and segments, finds faces, and sorts what is meshed. With FaceRule::kBox the sides of `box` bound the
-// domain; with the others it is not used.
+// domain; with the others it is not used. With a merge distance above 0 points that near are merged first, as MergeNear
+// does it, and those nearer than doubles serve in any case.
 //
 // Shapes:     points: n x 2, row-major.
 // Complexity: O((n + m) log (n + m)) for most inputs.
 // Errors:     those of CheckPoints, MakePlanarGraph, FindFaces and SortCloud; RESOURCE_EXHAUSTED, or another of the
 //             context's lender, when crossings make more of them than there is memory for.
 absl::StatusOr<DomainCloud> MakeDomainCloud(std::span<const double> points, const Features& features, const Box<2>& box,
-                                            uint64_t max_vertices, int threads, const RunContext& context);
+                                            double merge_distance, uint64_t max_vertices, int threads,
+                                            const RunContext& context);
 
 }  // namespace wellspace::core
 

@@ -1,5 +1,7 @@
 #include "core/domain_parameters.h"
 
+#include <cmath>
+
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
 
@@ -14,10 +16,14 @@ absl::Status ValidateDomainParameters(const MeshParameters& parameters, const Fe
   if (parameters.criterion != Criterion::kRadiusEdge) {
     return absl::InvalidArgumentError("criterion: a domain with segments has the radius-edge criterion alone");
   }
-  if (parameters.merge_distance > 0) {
+  if (!(features.snap_distance >= 0 && std::isfinite(features.snap_distance))) {
     return absl::InvalidArgumentError(
-        absl::StrCat("merge_distance: near points of a domain with segments are not merged, and it is ",
-                     parameters.merge_distance, "; leave it out"));
+        absl::StrCat("snap_distance: ", features.snap_distance, " is not a finite number of at least 0"));
+  }
+  if (features.snap_distance > 0 && features.crossings == CrossingRule::kRefuse) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("snap_distance: segments are not led through points by the rule `refuse`, and it is ",
+                     features.snap_distance, "; take `snap` or `split`, or leave it out"));
   }
   if (features.faces != FaceRule::kBox && !parameters.domain_low.empty()) {
     return absl::InvalidArgumentError(

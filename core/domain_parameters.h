@@ -9,8 +9,8 @@
 namespace wellspace::core {
 
 // Refuses parameters that a domain with `features` does not have, whatever its points: those that ValidateParameters
-// refuses, another dimension than 2 or criterion than kRadiusEdge, a merge_distance, a box beside another rule than
-// FaceRule::kBox. Ends, markers and seeds are not looked at.
+// refuses, another dimension than 2 or criterion than kRadiusEdge, a snap distance that is none or that no rule asks
+// for, a box beside another rule than FaceRule::kBox. Ends, markers and seeds are not looked at.
 //
 // Complexity: that of ValidateParameters.
 // Errors:     INVALID_ARGUMENT; the message begins with the name of the parameter and a colon.

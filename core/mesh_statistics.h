@@ -20,6 +20,8 @@ struct DomainStatistics {
   uint64_t touching_points = 0;    // that lay on a segment, which was split there
   uint64_t crossings = 0;          // of segments, which were split there
   uint64_t near_points = 0;        // that a segment was led through
+  uint64_t unused_seeds = 0;       // points of holes and regions in faces that the rule does not mesh
+  uint64_t first_unused_seed = 0;  // the number of the first of them, if there are any
   uint64_t exempt_simplices = 0;   // that break rho, at small angles of the input
   double min_input_angle_deg = 0;  // between two segments with a common end; 180 where there are no two
 };

@@ -12,6 +12,7 @@
 #include "core/base/thread_team.h"
 #include "core/estimate/domain_shape.h"
 #include "core/feasibility.h"
+#include "core/near_points.h"
 #include "core/plane_labels.h"
 #include "core/sorted_cloud.h"
 
@@ -36,6 +37,16 @@ absl::Status CheckShapes(const Features& features) {
                                                    " markers are not one for each of ", features.segment_count(),
                                                    " segments, nor none"));
   }
+  if (!features.is_open.empty() && features.is_open.size() != features.segment_count()) {
+    return absl::InvalidArgumentError(absl::StrCat("segments: ", features.is_open.size(),
+                                                   " marks of open ones are not one for each of ",
+                                                   features.segment_count(), " segments, nor none"));
+  }
+  if (!features.groups.empty() && features.groups.size() != features.segment_count()) {
+    return absl::InvalidArgumentError(absl::StrCat("segments: ", features.groups.size(),
+                                                   " groups are not one for each of ", features.segment_count(),
+                                                   " segments, nor none"));
+  }
   return absl::OkStatus();
 }
 
@@ -55,8 +66,9 @@ LargestArea LeastAreaOf(const PlanarDomain& planar, std::span<const FaceSeed> se
 
 absl::Status PlaneMesher::CheckInput(const Input& input) const { return CheckShapes(*input.features); }
 
-uint64_t PlaneMesher::BuildingBytes(const MeshParameters& /*parameters*/, const Input& input) const {
-  return DomainCloudBytes(input.points.size() / 2, input.features->segment_count(), input.features->seeds.size());
+uint64_t PlaneMesher::BuildingBytes(const MeshParameters& parameters, const Input& input) const {
+  return (parameters.merge_distance > 0 ? input.points.size() / 2 * kMergeBytes<2> : 0) +
+         DomainCloudBytes(input.points.size() / 2, input.features->segment_count(), input.features->seeds.size());
 }
 
 absl::Status PlaneMesher::Build(const MeshParameters& parameters, const Input& input, RunContext& context) {
@@ -69,8 +81,8 @@ absl::Status PlaneMesher::Build(const MeshParameters& parameters, const Input& i
       box = {PointAt<2>(parameters.domain_low, 0), PointAt<2>(parameters.domain_high, 0)};
     }
   }
-  WELLSPACE_ASSIGN_OR_RETURN(DomainCloud made, MakeDomainCloud(input.points, features, box, VertexBudget(parameters),
-                                                               parameters.threads, context));
+  WELLSPACE_ASSIGN_OR_RETURN(DomainCloud made, MakeDomainCloud(input.points, features, box, parameters.merge_distance,
+                                                               VertexBudget(parameters), parameters.threads, context));
   domain_ = made.domain;
   planar_ = std::move(made.planar);
   least_area_ = LeastAreaOf(*planar_, features.seeds, domain_.scale);
@@ -80,7 +92,8 @@ absl::Status PlaneMesher::Build(const MeshParameters& parameters, const Input& i
   meshed_box_.low = meshed_box_.high = domain_.Unscaled(structure_.point(VertexId{0}));
   NoteAddedFrom(0);
   WELLSPACE_RETURN_IF_ERROR(samples_.Take(domain_, parameters, context));
-  placer_.emplace(domain_, structure_, *planar_);
+  merge_distance_ = parameters.merge_distance;
+  placer_.emplace(domain_, structure_, *planar_, merge_distance_);
   return absl::OkStatus();
 }
 
@@ -98,7 +111,15 @@ absl::Status PlaneMesher::NumberPoints(const DomainCloud& made, std::span<const 
     names.of_input.push_back(point == PlanarGraph::kNoInput ? kNoOutput : names.of_sorted[point]);
   }
   WELLSPACE_RETURN_IF_ERROR(context.Check());
-  numbering_.Begin(std::move(names), points, {});
+  std::vector<uint32_t> stayed;  // where points were merged, and are meshed
+  if (planar_->graph().counts.merged_points > 0) {
+    for (const uint32_t input : planar_->graph().input_of_point) {
+      if (input != PlanarGraph::kNoInput) {
+        stayed.push_back(input);
+      }
+    }
+  }
+  numbering_.Begin(std::move(names), points, stayed);
   return absl::OkStatus();
 }
 
@@ -260,7 +281,8 @@ void PlaneMesher::AddStatistics(const Mesh& mesh, MeshStatistics& statistics, Qu
   const CleaningCounts& counts = planar_->graph().counts;
   const uint64_t added = statistics.input_points - planar_->graph().point_of_input.size();
   const uint64_t new_vertices = numbering_.distinct_inputs() - planar_->point_count();
-  statistics.duplicates = counts.equal_points + added - new_vertices;
+  statistics.merged_points = counts.merged_points + numbering_.merged_inputs();
+  statistics.duplicates = counts.equal_points + added - new_vertices - numbering_.merged_inputs();
   DomainStatistics& domain = *statistics.domain;  // since Describe
   domain.unmeshed_points = dropped_points_;
   domain.segments = planar_->segment_count();
@@ -269,6 +291,8 @@ void PlaneMesher::AddStatistics(const Mesh& mesh, MeshStatistics& statistics, Qu
   domain.touching_points = counts.touching_vertices;
   domain.crossings = counts.crossings;
   domain.near_points = counts.near_vertices;
+  domain.unused_seeds = planar_->faces().unused_seeds;
+  domain.first_unused_seed = planar_->faces().first_unused_seed;
   domain.min_input_angle_deg = planar_->MinAngle() * 180 / std::numbers::pi;
 }
 

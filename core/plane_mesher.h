@@ -49,7 +49,7 @@ class PlaneMesher final : public MesherOf<PlaneDomain> {
   uint64_t BuildingBytes(const MeshParameters& parameters, const Input& input) const override;
   absl::Status Build(const MeshParameters& parameters, const Input& input, RunContext& context) override;
   PlaneDomain ToRefine() override { return PlaneDomain(*planar_); }
-  AdderOptions Adding() override { return {.placer = &*placer_}; }
+  AdderOptions Adding() override { return {.merge_distance = merge_distance_, .placer = &*placer_}; }
   uint64_t OtherBytes() const override;
   absl::Status CheckDemands(const MeshParameters& parameters) const override;
   absl::Status CheckFeasibleHere(const MeshParameters& parameters) const override;
@@ -76,6 +76,7 @@ class PlaneMesher final : public MesherOf<PlaneDomain> {
   LargestArea least_area_;  // of the largest areas in faces that are meshed
   std::unique_ptr<PlanarDomain> planar_;
   Workspace<2> workspace_;
+  double merge_distance_ = 0;
   std::optional<PointPlacer> placer_;
   uint64_t dropped_points_ = 0;
   std::optional<MadeOfChains> made_;  // unless vertices have been added since

@@ -28,7 +28,7 @@ struct AdderOptions {
   double merge_distance = 0;  // points no farther than this from a vertex become that one
   // By vertex, whether it is given: set for those that points become; null: that is not asked for.
   std::vector<bool>* is_given = nullptr;
-  // That of a domain in the plane, for which points are not merged; null: all of the box is meshed.
+  // That of a domain in the plane, of the same merge distance; null: all of the box is meshed.
   PointPlacer* placer = nullptr;
 };
 

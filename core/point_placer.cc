@@ -40,7 +40,7 @@ absl::StatusOr<std::vector<PlanePlace>> PointPlacer::FindAll(std::span<const dou
       continue;
     }
     const Neighbor nearest = structure_.NearestTo(p, start(i), workspace_);
-    if (nearest.distance_sq < domain_.MinSeparation() * domain_.MinSeparation()) {
+    if (nearest.distance_sq < own_ * own_) {
       continue;
     }
     places[i] = Find(p, i, nearest, refused);

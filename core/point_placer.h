@@ -2,6 +2,7 @@
 #ifndef WELLSPACE_CORE_POINT_PLACER_H_
 #define WELLSPACE_CORE_POINT_PLACER_H_
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -30,11 +31,15 @@ namespace wellspace::core {
 class PointPlacer {
  public:
   // REQUIRES:   all references outlive this; the box of cells of `structure` is that of what is meshed.
-  PointPlacer(const Domain<2>& domain, const QueryStructure<2>& structure, PlanarDomain& planar)
-      : domain_(domain), structure_(structure), planar_(planar) {}
+  PointPlacer(const Domain<2>& domain, const QueryStructure<2>& structure, PlanarDomain& planar, double merge_distance)
+      : domain_(domain),
+        structure_(structure),
+        planar_(planar),
+        own_(std::max(domain.MinSeparation(), merge_distance * domain.scale)) {}
 
   // The place of each of `points`, n x 2; start(i) is a vertex near the i-th, or kNoVertex. Points that are vertices,
-  // nearer to one than the least separation, or not finite have none: that is for the caller to see.
+  // nearer to one than the least separation or the merge distance, or not finite have none: that is for the caller to
+  // see.
   //
   // Complexity: O(1) each in a refined mesh and near its start.
   // Errors:     INVALID_ARGUMENT, naming the points: not in the domain that is meshed, or nearer to a segment than the
@@ -69,6 +74,7 @@ class PointPlacer {
   const Domain<2>& domain_;
   const QueryStructure<2>& structure_;
   PlanarDomain& planar_;
+  const double own_;  // a point nearer than this to a vertex, scaled, is none of its own
   Workspace<2> workspace_;
 };
 

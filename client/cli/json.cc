@@ -37,6 +37,8 @@ const char* FaceRuleName(client::FaceRule rule) {
       return "box";
     case client::FaceRule::kHoles:
       return "holes";
+    case client::FaceRule::kUnion:
+      return "union";
     case client::FaceRule::kEvenOdd:
       break;
   }
@@ -146,6 +148,7 @@ Json SessionJson(const client::Session& session) {
   json["seed_count"] = session.seed_count;
   json["faces"] = session.faces.has_value() ? Json(FaceRuleName(*session.faces)) : Json(nullptr);
   json["crossings"] = session.faces.has_value() ? nlohmann::ordered_json(CrossingRuleName(session.crossings)) : nullptr;
+  json["snap_distance"] = OrNull(session.snap_distance);
   json["size_count"] = session.size_count;
   json["stored_bytes"] = session.stored_bytes;
   json["vertex_count"] = session.vertex_count;

@@ -58,6 +58,8 @@ std::optional<FaceRule> RuleFromProto(v1::FaceRule rule) {
       return FaceRule::kHoles;
     case v1::FACE_RULE_EVEN_ODD:
       return FaceRule::kEvenOdd;
+    case v1::FACE_RULE_UNION:
+      return FaceRule::kUnion;
     default:
       return std::nullopt;
   }
@@ -144,7 +146,9 @@ MeshStatistics StatisticsFromProto(const v1::MeshStatistics& message) {
                          .crossings = domain.crossings(),
                          .near_points = domain.near_points(),
                          .exempt_simplices = domain.exempt_simplices(),
-                         .min_input_angle_deg = domain.min_input_angle_deg()};
+                         .min_input_angle_deg = domain.min_input_angle_deg(),
+                         .unused_seeds = domain.unused_seeds(),
+                         .first_unused_seed = domain.first_unused_seed()};
   }
   statistics.vertices = message.vertices();
   statistics.simplices = message.simplices();
@@ -326,6 +330,7 @@ absl::StatusOr<Session> SessionFromProto(const v1::Session& message) {
                  .crossings = message.crossings() == v1::CROSSING_RULE_SPLIT  ? CrossingRule::kSplit
                               : message.crossings() == v1::CROSSING_RULE_SNAP ? CrossingRule::kSnap
                                                                               : CrossingRule::kRefuse,
+                 .snap_distance = message.has_snap_distance() ? std::optional(message.snap_distance()) : std::nullopt,
                  .size_count = message.size_count(),
                  .stored_bytes = message.stored_bytes()};
 }

@@ -12,6 +12,7 @@ constexpr size_t kSeedsOfARequest = 4'096;
 v1::FaceRule RuleToProto(FaceRule rule) {
   return rule == FaceRule::kHoles     ? v1::FACE_RULE_HOLES
          : rule == FaceRule::kEvenOdd ? v1::FACE_RULE_EVEN_ODD
+         : rule == FaceRule::kUnion   ? v1::FACE_RULE_UNION
                                       : v1::FACE_RULE_BOX;
 }
 
@@ -28,6 +29,9 @@ size_t FillSegments(const Features& features, size_t first, v1::SegmentChunk& ch
     if (!features.markers.empty()) {
       chunk.add_markers(features.markers[first]);
     }
+    if (!features.groups.empty()) {
+      chunk.add_groups(features.groups[first]);
+    }
   }
   return first;
 }
@@ -39,6 +43,9 @@ size_t FillFaces(const Features& features, size_t first, v1::FaceOptions& option
   options.set_crossings(features.crossings == CrossingRule::kSplit  ? v1::CROSSING_RULE_SPLIT
                         : features.crossings == CrossingRule::kSnap ? v1::CROSSING_RULE_SNAP
                                                                     : v1::CROSSING_RULE_REFUSE);
+  if (features.snap_distance.has_value()) {
+    options.set_snap_distance(*features.snap_distance);
+  }
   for (; first < end; ++first) {
     const FaceSeed& seed = features.seeds[first];
     v1::FaceSeed& message = *options.add_seeds();

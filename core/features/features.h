@@ -15,12 +15,14 @@ enum class FaceRule : uint8_t {
   kBox,      // all faces in the box
   kHoles,    // all bounded faces; the box bounds nothing
   kEvenOdd,  // those that an odd number of ring segments separates from infinity
+  kUnion,    // those that an odd number of ring segments of some group separates from infinity
 };
 
 // What becomes of segments that cross, and of vertices that are too close to a segment.
 enum class CrossingRule : uint8_t {
   kRefuse,  // an error names them
-  kSnap,    // a segment is led through a vertex that is too close to it; crossings are refused
+  kSnap,    // a segment is led through a vertex that is too close to it, or nearer than the snap distance; crossings
+            // are refused
   kSplit,   // the same, and a crossing, rounded, becomes a vertex
 };
 
@@ -46,10 +48,12 @@ struct Features {
   std::span<const uint32_t> ends;    // m x 2, row-major: indices of points
   std::span<const int32_t> markers;  // m, or none: then all are 0
   std::span<const uint8_t>
-      is_open;  // m, or none: 1 for a segment that is no part of a ring, so that kEvenOdd ignores it
+      is_open;  // m, or none: 1 for a segment that is no part of a ring, so that kEvenOdd and kUnion ignore it
+  std::span<const uint32_t> groups;  // m, or none: the group of each, any number; of kUnion. None: all are of one
   std::span<const FaceSeed> seeds;
   FaceRule faces = FaceRule::kBox;
   CrossingRule crossings = CrossingRule::kRefuse;
+  double snap_distance = 0;  // of the points' unit; none where kRefuse
 
   size_t segment_count() const { return ends.size() / 2; }
   bool IsEmpty() const { return ends.empty() && seeds.empty(); }

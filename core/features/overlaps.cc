@@ -184,6 +184,7 @@ class OverlapFinder {
     std::set<std::pair<int32_t, uint32_t>> open_by_marker;  // but for sides of the box
     uint32_t open_rings = 0;
     uint32_t open_polygons = OddSets::kEmpty;
+    uint32_t open_groups = OddSets::kEmpty;
     uint64_t places = 0;  // so far
     for (size_t i = 0; i < ends.size(); ++i) {
       if (i % 1024 == 0) {
@@ -192,13 +193,14 @@ class OverlapFinder {
       if (i > 0 && ends[i].point != ends[i - 1].point) {
         ++places;
         if (!open.empty()) {
-          WELLSPACE_RETURN_IF_ERROR(
-              AddPart({ends[i - 1].point, ends[i].point}, open, open_by_marker, open_rings, open_polygons));
+          WELLSPACE_RETURN_IF_ERROR(AddPart({ends[i - 1].point, ends[i].point}, open, open_by_marker, open_rings,
+                                            open_polygons, open_groups));
         }
       }
       const uint32_t s = ends[i].segment;
       const GraphSegment& segment = graph_.segments[s];
       open_polygons = graph_.polygons.Join(open_polygons, segment.polygons);  // the second time it is taken out
+      open_groups = graph_.groups.Join(open_groups, segment.groups);
       if (ends[i].is_begin) {
         open.insert(s);
         open_rings += segment.rings;
@@ -208,6 +210,7 @@ class OverlapFinder {
         open.erase(s);
         open_rings -= segment.rings;
         open_polygons = open.empty() ? OddSets::kEmpty : open_polygons;
+        open_groups = open.empty() ? OddSets::kEmpty : open_groups;
         graph_.counts.touching_vertices += places;
       }
       if (!segment.IsBoxSide()) {
@@ -224,8 +227,8 @@ class OverlapFinder {
 
   // The part between two points of all that are open, of which the first by source keeps its name.
   absl::Status AddPart(const std::array<uint32_t, 2>& points, const std::set<uint32_t>& open,
-                       const std::set<std::pair<int32_t, uint32_t>>& open_by_marker, uint32_t rings,
-                       uint32_t polygons) {
+                       const std::set<std::pair<int32_t, uint32_t>>& open_by_marker, uint32_t rings, uint32_t polygons,
+                       uint32_t groups) {
     GraphSegment part = graph_.segments[*open.begin()];
     if (!open_by_marker.empty() && open_by_marker.begin()->first != open_by_marker.rbegin()->first) {
       const auto next = std::find_if(open.begin(), open.end(), [&](uint32_t s) {
@@ -238,6 +241,7 @@ class OverlapFinder {
     part.b = points[1];
     part.rings = rings;
     part.polygons = polygons;
+    part.groups = groups;
     parts_.push_back(part);
     return absl::OkStatus();
   }

@@ -12,6 +12,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/cancellable_sort.h"
 #include "core/base/status_macros.h"
+#include "core/features/face_walk.h"
 #include "core/features/place.h"
 #include "core/features/polygon_seeds.h"
 #include "core/features/union_find.h"
@@ -264,6 +265,9 @@ class FaceFinder {
   }
 
   absl::Status ApplyRule() {
+    if (rule_ == FaceRule::kUnion) {
+      return ApplyUnion();
+    }
     if (rule_ != FaceRule::kEvenOdd) {
       for (size_t face = 1; face < out_.faces.size(); ++face) {
         out_.faces[face].is_meshed = true;
@@ -303,6 +307,23 @@ class FaceFinder {
     return absl::OkStatus();
   }
 
+  // Meshes the faces that the rings of some group surround an odd number of times.
+  absl::Status ApplyUnion() {
+    std::set<uint32_t> around;  // groups
+    const auto toggle = [&](uint32_t group) {
+      if (around.erase(group) == 0) {
+        around.insert(group);
+      }
+    };
+    const auto visit = [&](uint32_t face, std::span<const HalfEdge> /*half_edges*/) {
+      out_.faces[face].is_meshed = !around.empty();
+      return absl::OkStatus();
+    };
+    return FaceWalk(graph_, out_, context_)
+        .Run(
+            graph_.groups, [](const GraphSegment& segment) { return segment.groups; }, toggle, visit);
+  }
+
   // What a point says of a face comes before what polygons do.
   absl::Status ApplySeeds() {
     WELLSPACE_ASSIGN_OR_RETURN(const std::vector<uint32_t> polygons,
@@ -314,9 +335,13 @@ class FaceFinder {
         continue;
       }
       uint32_t& first = seed_of[seed_face_[i]];
+      const bool is_unused = !out_.faces[seed_face_[i]].is_meshed;
+      if (is_unused) {
+        out_.first_unused_seed = out_.unused_seeds++ == 0 ? i : out_.first_unused_seed;
+      }
       if (first == kNone) {
         first = i;
-      } else if (!seeds_[first].SaysTheSameAs(seed)) {
+      } else if (!is_unused && !seeds_[first].SaysTheSameAs(seed)) {
         return absl::InvalidArgumentError(absl::StrCat("seeds[", first, "] at ", PlaceText(seeds_[first].at),
                                                        " and seeds[", i, "] at ", PlaceText(seed.at),
                                                        " lie in one face and differ; leave one out"));
@@ -380,6 +405,8 @@ absl::Status KeepMeshed(std::span<const uint32_t> permutation, PlanarGraph& grap
   kept.input_of_point.resize(permutation.size());
   PlanarFaces kept_faces;
   kept_faces.faces = faces.faces;
+  kept_faces.unused_seeds = faces.unused_seeds;
+  kept_faces.first_unused_seed = faces.first_unused_seed;
   kept_faces.point_face.resize(permutation.size());
   std::vector<uint32_t> old_of(permutation.size());
   for (uint32_t p = 0, next = 0; p < graph.points.size(); ++p) {

@@ -32,7 +32,10 @@ constexpr HalfEdge TwinOf(HalfEdge half_edge) { return half_edge ^ 1; }
 // Invariants: (1) both sides of every segment have a face, for good, since nothing crosses a segment.
 struct PlanarFaces {
   std::vector<Face> faces;
-  std::vector<uint32_t> left_face;   // by half-edge
+  std::vector<uint32_t> left_face;  // by half-edge
+  // Seeds that are points and mean nothing: the rule does not mesh the face that they lie in. How many, and the first.
+  uint64_t unused_seeds = 0;
+  uint32_t first_unused_seed = 0;
   std::vector<uint32_t> point_face;  // by point: where it lies if it is an end of no segment, else kOnSegments
   // The half-edges that leave point p, counterclockwise: around[first_around[p]] to around[first_around[p + 1]].
   std::vector<uint32_t> first_around;
@@ -48,7 +51,7 @@ struct PlanarFaces {
 
 // Finds the faces of `graph`, and which of them `rule` and `seeds` have meshed.
 //
-// Complexity: O((n + m) log (n + m)).
+// Complexity: O((n + m) log (n + m)); under kUnion also the sum over all segments of the groups that they are of.
 // Errors:     INVALID_ARGUMENT: a seed that is not finite, lies on a segment, or names a face for which another seed
 //             says otherwise; for kEvenOdd, rings that are not closed; where nothing is to be meshed. CANCELLED,
 //             DEADLINE_EXCEEDED.

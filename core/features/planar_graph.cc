@@ -18,7 +18,9 @@
 #include "core/features/near_segment.h"
 #include "core/features/overlaps.h"
 #include "core/features/place.h"
+#include "core/features/point_merge.h"
 #include "core/features/polygon_seeds.h"
+#include "core/features/segment_groups.h"
 #include "core/features/segment_pairs.h"
 #include "core/geometry/exact_measure.h"
 #include "core/geometry/segment.h"
@@ -76,12 +78,14 @@ class GraphMaker {
              const RunContext& context)
       : features_(features),
         least_separation_(least_separation),
+        reach_(features.crossings == CrossingRule::kRefuse ? least_separation
+                                                           : std::max(least_separation, features.snap_distance)),
         max_vertices_(max_vertices),
         context_(context),
         team_(threads) {}
 
-  absl::StatusOr<PlanarGraph> Make(std::span<const double> points, const Box<2>* box) {
-    WELLSPACE_RETURN_IF_ERROR(MergeEqualPoints(points));
+  absl::StatusOr<PlanarGraph> Make(std::span<const double> points, PointMerge merge, const Box<2>* box) {
+    WELLSPACE_RETURN_IF_ERROR(TakePoints(points, std::move(merge)));
     WELLSPACE_RETURN_IF_ERROR(TakeSegments());
     if (box != nullptr) {
       AddBox(*box);
@@ -114,37 +118,30 @@ class GraphMaker {
     return step % kStepsBetweenChecks == 0 ? context_.Check() : absl::OkStatus();
   }
 
-  absl::Status MergeEqualPoints(std::span<const double> points) {
-    const auto count = static_cast<uint32_t>(points.size() / 2);
-    std::vector<uint32_t> order(count);
-    std::iota(order.begin(), order.end(), 0);
-    const auto at = [&](uint32_t i) { return PointAt<2>(points, i); };
-    const auto is_before = [&](uint32_t i, uint32_t j) { return std::pair(at(i), i) < std::pair(at(j), j); };
-    WELLSPACE_RETURN_IF_ERROR(CancellableSort(order, is_before, context_));
-    std::vector<uint32_t> first(count);
-    for (uint32_t k = 0; k < count; ++k) {
-      WELLSPACE_RETURN_IF_ERROR(CheckAt(k));
-      first[order[k]] = k > 0 && at(order[k]) == at(order[k - 1]) ? first[order[k - 1]] : order[k];
+  absl::Status TakePoints(std::span<const double> points, PointMerge merge) {
+    graph_.points.reserve(merge.inputs.size());
+    for (const uint32_t input : merge.inputs) {
+      graph_.points.push_back(PointAt<2>(points, input));
     }
-    graph_.point_of_input.resize(count);
-    for (uint32_t i = 0; i < count; ++i) {
+    graph_.counts.equal_points = merge.equal;
+    graph_.counts.merged_points = merge.merged;
+    has_taken_others_.resize(merge.merged > 0 ? merge.inputs.size() : 0);
+    for (uint32_t i = 0; merge.merged > 0 && i < merge.place_of.size(); ++i) {
       WELLSPACE_RETURN_IF_ERROR(CheckAt(i));
-      if (first[i] == i) {
-        graph_.point_of_input[i] = static_cast<uint32_t>(graph_.points.size());
-        graph_.points.push_back(at(i));
-        graph_.input_of_point.push_back(i);
-      } else {
-        graph_.point_of_input[i] = graph_.point_of_input[first[i]];
-        ++graph_.counts.equal_points;
-      }
+      const uint32_t place = merge.place_of[i];
+      has_taken_others_[place] = has_taken_others_[place] || PointAt<2>(points, i) != At(place);
     }
-    return absl::OkStatus();
+    graph_.point_of_input = std::move(merge.place_of);
+    graph_.input_of_point = std::move(merge.inputs);
+    return context_.Check();
   }
 
   absl::Status TakeSegments() {
     const size_t inputs = graph_.point_of_input.size();
     WELLSPACE_ASSIGN_OR_RETURN(const std::vector<uint32_t> polygons, PolygonsOfSegments(features_, context_));
     graph_.polygons = OddSets(static_cast<uint32_t>(features_.seeds.size()));
+    WELLSPACE_ASSIGN_OR_RETURN(const SegmentGroups groups, GroupsOfSegments(features_, context_));
+    graph_.groups = OddSets(groups.count());
     for (size_t s = 0; s < features_.segment_count(); ++s) {
       WELLSPACE_RETURN_IF_ERROR(CheckAt(s));
       GraphSegment segment;
@@ -161,13 +158,17 @@ class GraphMaker {
       segment.source = static_cast<uint32_t>(s);
       segment.rings = features_.is_open.empty() || features_.is_open[s] == 0 ? 1 : 0;
       segment.polygons = polygons.empty() ? OddSets::kEmpty : polygons[s];
+      segment.groups = groups.of_segment.empty() ? OddSets::kEmpty : groups.of_segment[s];
       if (segment.a == segment.b) {
         ++graph_.counts.empty_segments;
       } else {
         graph_.segments.push_back(segment);
       }
     }
-    return polygons.empty() ? absl::OkStatus() : CheckPolygonsClosed(graph_.point_of_input, features_, context_);
+    if (!polygons.empty()) {
+      WELLSPACE_RETURN_IF_ERROR(CheckPolygonsClosed(graph_.point_of_input, features_, context_));
+    }
+    return CheckGroupsClosed(graph_.point_of_input, features_, groups, context_);
   }
 
   uint32_t AddPoint(const Point<2>& p) {
@@ -222,6 +223,7 @@ class GraphMaker {
       graph_.counts.duplicate_segments += next.IsBoxSide() ? 0 : 1;
       first.rings += next.rings;
       first.polygons = graph_.polygons.Join(first.polygons, next.polygons);
+      first.groups = graph_.groups.Join(first.groups, next.groups);
       is_dropped[order[k]] = true;
       std::swap(order[k - 1], order[k]);  // the next is compared with what stays
     }
@@ -255,7 +257,7 @@ class GraphMaker {
     for (const GraphSegment& segment : graph_.segments) {
       ends.push_back({segment.a, segment.b});
     }
-    const SegmentPairs pairs(graph_.points, ends, least_separation_, context_);
+    const SegmentPairs pairs(graph_.points, ends, reach_, context_);
     WELLSPACE_ASSIGN_OR_RETURN(const std::vector<SegmentPairs::Group> parts, pairs.Parts(team_));
     std::vector<FaultsOfPart> found(parts.size());
     are_too_many_ = false;
@@ -275,13 +277,15 @@ class GraphMaker {
     if (are_too_many_ || faults.size() > MostPairs()) {
       return absl::ResourceExhaustedError(absl::StrCat(
           "segments: there are more than ", MostPairs(),
-          " places where they cross or touch each other, or points lie on them, two by two; give fewer segments"));
+          " places where they cross or touch each other, or points lie on them or near them, two by two; give fewer "
+          "segments",
+          features_.snap_distance > least_separation_ ? ", or a smaller snap_distance" : ""));
     }
     return faults;
   }
 
   // Tells needles from other points that are too close to a segment: they are closed, whatever the rule, since no
-  // double separates what is in them.
+  // double separates what is in them. So is what merging has opened.
   absl::Status FindNeedles(std::vector<Fault>& faults) {
     const auto is_near = [](const Fault& fault) { return fault.kind == Fault::Kind::kNear; };
     if (std::none_of(faults.begin(), faults.end(), is_near)) {
@@ -298,12 +302,16 @@ class GraphMaker {
     };
     for (Fault& fault : faults) {
       const GraphSegment& segment = graph_.segments[fault.segment];
-      if (is_near(fault) && (are_joined(fault.other, segment.a) || are_joined(fault.other, segment.b))) {
+      if (is_near(fault) && (are_joined(fault.other, segment.a) || are_joined(fault.other, segment.b) ||
+                             HasMoved(segment.a) || HasMoved(segment.b) || HasMoved(fault.other))) {
         fault.kind = Fault::Kind::kNeedle;
       }
     }
     return absl::OkStatus();
   }
+
+  // Whether merging has moved what ends at `point`. It may have moved a segment off a vertex that it ran through.
+  bool HasMoved(uint32_t point) const { return point < has_taken_others_.size() && has_taken_others_[point]; }
 
   size_t MostPairs() const { return std::max<size_t>(kMostPairs, max_vertices_); }
   bool IsStopped() const { return are_too_many_.load(std::memory_order_relaxed) || context_.IsCancelled(); }
@@ -409,7 +417,7 @@ class GraphMaker {
     const Point<2>& b = At(s.b);
     const Point<2>& p = At(point);
     const Box<2> box = BoxOfEnds(a, b);
-    if (DistanceSq<2>(p, box) > 4 * least_separation_ * least_separation_) {
+    if (DistanceSq<2>(p, box) > 4 * reach_ * reach_) {
       return std::nullopt;
     }
     if (SideOf(a, b, p) == Sign::kZero) {
@@ -417,8 +425,14 @@ class GraphMaker {
     }
     // Beyond an end, two points are too close to each other, which is told elsewhere.
     const double t = Along(a, b, p);
-    return t > 0 && t < 1 && DistanceToSegment(a, b, p) < least_separation_ ? std::optional(Fault::Kind::kNear)
-                                                                            : std::nullopt;
+    const double distance = DistanceToSegment(a, b, p);
+    if (!(t > 0 && t < 1 && distance < reach_)) {
+      return std::nullopt;
+    }
+    // A segment is led through what is farther away only if both parts are shorter than it, so that this ends: else it
+    // might be led from one of two points beside each other to the other, and back.
+    const bool is_led = std::max(DistanceSq<2>(a, p), DistanceSq<2>(p, b)) < DistanceSq<2>(a, b);
+    return distance < least_separation_ || is_led ? std::optional(Fault::Kind::kNear) : std::nullopt;
   }
 
   bool Cross(uint32_t s, uint32_t t) const {
@@ -496,13 +510,13 @@ class GraphMaker {
     return absl::OkStatus();
   }
 
-  // The vertex within the least separation of `p`, or a new one: where several segments cross in one place, their
-  // crossings are rounded to places beside each other.
+  // The vertex within reach of `p`, or a new one: where several segments cross in one place, their crossings are
+  // rounded to places beside each other.
   //
   // Complexity: O(log n); O(n log n) the first time.
   uint32_t VertexNear(const Point<2>& p) {
     const auto cell_of = [this](const Point<2>& q) {
-      return Point<2>{std::floor(q[0] / least_separation_), std::floor(q[1] / least_separation_)};
+      return Point<2>{std::floor(q[0] / reach_), std::floor(q[1] / reach_)};
     };
     for (; in_cells_ < graph_.points.size(); ++in_cells_) {
       by_cell_.emplace(cell_of(At(in_cells_)), in_cells_);
@@ -514,9 +528,8 @@ class GraphMaker {
         const auto [begin, end] = by_cell_.equal_range({x, y});
         for (auto at = begin; at != end; ++at) {
           const double distance = Distance<2>(At(at->second), p);
-          if (distance < least_separation_ &&
-              (nearest == kNone ||
-               std::pair(distance, At(at->second)) < std::pair(Distance<2>(At(nearest), p), At(nearest)))) {
+          if (distance < reach_ && (nearest == kNone || std::pair(distance, At(at->second)) <
+                                                            std::pair(Distance<2>(At(nearest), p), At(nearest)))) {
             nearest = at->second;
           }
         }
@@ -584,12 +597,14 @@ class GraphMaker {
 
   const Features& features_;
   const double least_separation_;
+  const double reach_;  // a vertex nearer than this to a segment is too close to it
   const uint64_t max_vertices_;
   const RunContext& context_;
   ThreadTeam team_;
   std::atomic<bool> are_too_many_ = false;  // faults
   PlanarGraph graph_;
-  std::multimap<Point<2>, uint32_t> by_cell_;  // points by cells as large as the least separation, of which so many:
+  std::vector<bool> has_taken_others_;         // by point: others are it now; empty if none is
+  std::multimap<Point<2>, uint32_t> by_cell_;  // points by cells as large as the reach, of which so many:
   uint32_t in_cells_ = 0;
 };
 
@@ -597,8 +612,11 @@ class GraphMaker {
 
 absl::StatusOr<PlanarGraph> MakePlanarGraph(std::span<const double> points, const Features& features, const Box<2>* box,
                                             double least_separation, uint64_t max_vertices, int threads,
-                                            const RunContext& context) {
-  return GraphMaker(features, least_separation, max_vertices, threads, context).Make(points, box);
+                                            const RunContext& context, std::optional<PointMerge> merge) {
+  if (!merge.has_value()) {
+    WELLSPACE_ASSIGN_OR_RETURN(merge, MergeTwins(points, features, least_separation, context));
+  }
+  return GraphMaker(features, least_separation, max_vertices, threads, context).Make(points, *std::move(merge), box);
 }
 
 }  // namespace wellspace::core

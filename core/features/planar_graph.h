@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "core/base/run_context.h"
 #include "core/features/features.h"
 #include "core/features/odd_sets.h"
+#include "core/features/point_merge.h"
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
 
@@ -26,6 +28,7 @@ struct GraphSegment {
   uint32_t source = 0;                  // the first given segment that it is a part of, or a side of the box
   uint32_t rings = 1;                   // so many ring segments lie on it
   uint32_t polygons = OddSets::kEmpty;  // whose rings an odd number of times lie on it: a set of PlanarGraph::polygons
+  uint32_t groups = OddSets::kEmpty;    // the same of groups: a set of PlanarGraph::groups
 
   bool IsBoxSide() const { return source >= kBoxSide; }
 };
@@ -33,6 +36,7 @@ struct GraphSegment {
 // What has been changed on the way from the segments that are given to a graph.
 struct CleaningCounts {
   uint64_t equal_points = 0;        // beyond the first at each place
+  uint64_t merged_points = 0;       // that have become one with other coordinates
   uint64_t empty_segments = 0;      // of no length
   uint64_t duplicate_segments = 0;  // beyond the first
   uint64_t touching_vertices = 0;   // that lay on a segment, which was split there
@@ -43,7 +47,7 @@ struct CleaningCounts {
 
 // Invariants: (1) points are distinct; (2) two segments have at most one point in common, and then an end of both; (3)
 // a point on a segment is an end of it; (4) a point is at least the least separation from every segment that it is no
-// end of.
+// end of, and at least the snap distance, if there is one, where both parts of the segment would be shorter than it.
 struct PlanarGraph {
   std::vector<Point<2>> points;          // those that are given in the order of their first appearance, then others
   std::vector<uint32_t> point_of_input;  // by given point
@@ -51,13 +55,15 @@ struct PlanarGraph {
   std::vector<GraphSegment> segments;    // by source, then along it from its lower end to its higher one
   CleaningCounts counts;
   OddSets polygons;  // of seeds
+  OddSets groups;    // as GroupsOfSegments numbers them; of FaceRule::kUnion
 
   static constexpr uint32_t kNoInput = std::numeric_limits<uint32_t>::max();
 };
 
 // Makes a planar graph of the segments of `features` over `points`, n x 2; by exact signs alone, but for
-// `least_separation`, the distance that has to be between a vertex and a segment that it is not on. With `box` its
-// corners and sides belong to the graph, too.
+// `least_separation`, the distance that has to be between a vertex and a segment that it is not on. Where segments are
+// led through vertices, those nearer than features.snap_distance to one are too close to it, too. With `box` its
+// corners and sides belong to the graph. `merge` says which points are one; none: as MergeTwins finds them.
 //
 // Guarantees: (1) where nothing crosses and nothing is too close, no coordinate is computed: a segment is split only at
 //             points that lie on it exactly; (2) neither the order of segments nor that of points, nor which end comes
@@ -65,14 +71,15 @@ struct PlanarGraph {
 // Complexity: O((n + m) log (n + m)) for most inputs, and what is found. That is so, too, where all segments have a
 //             common end, lie side by side or on a common line.
 // Errors:     INVALID_ARGUMENT, naming segments, points and places: an end that does not exist; markers that differ on
-//             one segment; seeds whose polygons are not there, or not closed; and, unless they are to be split,
+//             one segment; seeds whose polygons are not there, or not closed; under
+//             kUnion groups whose rings are not closed; and, unless they are to be split,
 //             segments that cross and vertices that are too close; RESOURCE_EXHAUSTED when splitting does not end, or
 //             crossings make more than `max_vertices`; CANCELLED, DEADLINE_EXCEEDED.
 // Threads:    uses `threads`, at most as many as the machine has cores.
 // Source:     docs/design/features.md.
 absl::StatusOr<PlanarGraph> MakePlanarGraph(std::span<const double> points, const Features& features, const Box<2>* box,
                                             double least_separation, uint64_t max_vertices, int threads,
-                                            const RunContext& context);
+                                            const RunContext& context, std::optional<PointMerge> merge = std::nullopt);
 
 }  // namespace wellspace::core
 

@@ -9,6 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
+#include "core/features/closed_rings.h"
 #include "core/features/face_walk.h"
 #include "core/features/odd_sets.h"
 #include "core/features/place.h"
@@ -116,36 +117,12 @@ absl::StatusOr<std::vector<uint32_t>> PolygonsOfSegments(const Features& feature
 
 absl::Status CheckPolygonsClosed(std::span<const uint32_t> point_of_input, const Features& features,
                                  const RunContext& context) {
-  struct End {
-    uint32_t point;
-    uint64_t segment;
-  };
-  std::vector<End> ends;
+  std::vector<uint32_t> segments;
   for (uint32_t i = 0; i < features.seeds.size(); ++i) {
-    const FaceSeed& seed = features.seeds[i];
-    ends.clear();
-    for (uint64_t s = seed.first_segment; s < uint64_t{seed.first_segment} + seed.segment_count; ++s) {
-      ends.push_back({point_of_input[features.ends[2 * s]], s});
-      ends.push_back({point_of_input[features.ends[2 * s + 1]], s});
-    }
-    if (i % kStepsBetweenLooks == 0 || seed.segment_count >= kStepsBetweenLooks) {
-      WELLSPACE_RETURN_IF_ERROR(context.Check());
-    }
-    std::sort(ends.begin(), ends.end(),
-              [](const End& a, const End& b) { return std::tie(a.point, a.segment) < std::tie(b.point, b.segment); });
-    for (size_t begin = 0, end = 0; begin < ends.size(); begin = end) {
-      while (end < ends.size() && ends[end].point == ends[begin].point) {
-        ++end;
-      }
-      if ((end - begin) % 2 != 0) {
-        const uint64_t s = ends[begin].segment;
-        const uint32_t first = features.ends[2 * s];
-        const uint32_t at = point_of_input[first] == ends[begin].point ? first : features.ends[2 * s + 1];
-        return absl::InvalidArgumentError(absl::StrCat("seeds[", i, "]: its polygon is not closed: at points[", at,
-                                                       "], an end of segments[", s, "], ", end - begin,
-                                                       " of its segments end; expected an even number at each point"));
-      }
-    }
+    segments.resize(features.seeds[i].segment_count);
+    std::iota(segments.begin(), segments.end(), features.seeds[i].first_segment);
+    const auto whose = [i] { return absl::StrCat("seeds[", i, "]: its polygon is"); };
+    WELLSPACE_RETURN_IF_ERROR(CheckClosed(segments, point_of_input, features, whose, context));
   }
   return absl::OkStatus();
 }

@@ -9,6 +9,7 @@
 #include <map>
 #include <numeric>
 #include <optional>
+#include <set>
 #include <tuple>
 #include <utility>
 
@@ -139,14 +140,49 @@ class Follower {
     for (uint32_t f = 0; f < pieces.size(); ++f) {
       pieces[f] = Between(facets[2 * f], facets[2 * f + 1], source_of_[f]);
       pieces[f].rings = chain_of_[f] == kNone ? 0 : static_cast<uint32_t>(rings[chain_of_[f]][place_in_chain_[f]]);
+      pieces[f].groups.clear();
+    }
+    if (!segments_.groups.empty()) {
+      SetGroups(pieces);
     }
     return pieces;
+  }
+
+  // The groups of which an odd number of rings lies on each facet.
+  void SetGroups(std::vector<Piece>& pieces) const {
+    std::vector<std::vector<uint32_t>> facets;  // of each chain, in their order
+    for (const Chain& chain : chains_) {
+      facets.emplace_back(chain.vertices.size() - 1, kNone);
+    }
+    for (uint32_t f = 0; f < pieces.size(); ++f) {
+      if (chain_of_[f] != kNone) {
+        facets[chain_of_[f]][place_in_chain_[f]] = f;
+      }
+    }
+    for (size_t c = 0; c < chains_.size(); ++c) {
+      std::vector<std::pair<uint32_t, uint32_t>> toggles = chains_[c].toggles;
+      std::sort(toggles.begin(), toggles.end());
+      std::set<uint32_t> on;
+      auto next = toggles.begin();
+      for (uint32_t place = 0; place < facets[c].size(); ++place) {
+        for (; next != toggles.end() && next->first == place; ++next) {
+          if (on.erase(next->second) == 0) {
+            on.insert(next->second);
+          }
+        }
+        pieces[facets[c][place]].groups.assign(on.begin(), on.end());
+      }
+    }
   }
 
   Piece Between(uint32_t u, uint32_t v, uint32_t source) const {
     const bool is_up = vertices_[u] < vertices_[v];
     const uint32_t rings = source == Piece::kNotGiven ? 0 : segments_.is_ring[source];
-    return {.ends = {is_up ? u : v, is_up ? v : u}, .rings = rings, .source = source};
+    Piece piece{.ends = {is_up ? u : v, is_up ? v : u}, .rings = rings, .source = source};
+    if (rings > 0 && !segments_.groups.empty()) {
+      piece.groups = {segments_.groups[source]};
+    }
+    return piece;
   }
 
  private:
@@ -156,6 +192,7 @@ class Follower {
   struct Chain {
     std::vector<uint32_t> vertices;
     std::vector<int64_t> rings;  // of each facet less those of the one before; one more at the end
+    std::vector<std::pair<uint32_t, uint32_t>> toggles;  // from which facet on a ring of which group begins or ends
   };
 
   struct Stop {
@@ -204,7 +241,7 @@ class Follower {
     if (chain == kNone) {
       if (open_chain == kNone || chains_[open_chain].vertices.back() != at) {
         open_chain = static_cast<uint32_t>(chains_.size());
-        chains_.push_back({{at}, {0}});
+        chains_.push_back({.vertices = {at}, .rings = {0}, .toggles = {}});
       }
       chain = open_chain;
       place_in_chain_[way.facet] = static_cast<uint32_t>(chains_[chain].vertices.size() - 1);
@@ -225,6 +262,11 @@ class Follower {
     }
     line.rings[std::min(from, to)] += segments_.is_ring[segment];
     line.rings[std::max(from, to)] -= segments_.is_ring[segment];
+    if (segments_.is_ring[segment] != 0 && !segments_.groups.empty()) {
+      for (const uint32_t end : {from, to}) {
+        line.toggles.emplace_back(end, segments_.groups[segment]);
+      }
+    }
     return line.vertices[to];
   }
 
@@ -396,6 +438,8 @@ class StretchCutter {
       for (end = begin + 1; end < order.size() && made_.pieces[order[end]].ends == made_.pieces[order[begin]].ends;
            ++end) {
         made_.pieces[order[begin]].rings += made_.pieces[order[end]].rings;
+        std::vector<uint32_t>& groups = made_.pieces[order[begin]].groups;
+        groups.insert(groups.end(), made_.pieces[order[end]].groups.begin(), made_.pieces[order[end]].groups.end());
         is_left_out[order[end]] = order[end] >= facets_;
       }
     }
@@ -499,6 +543,9 @@ BoundingSegments SegmentsOf(std::span<const double> points, const Features& feat
   for (size_t s = 0; s < made.given; ++s) {
     made.ends.push_back({features.ends[2 * s], features.ends[2 * s + 1]});
     made.is_ring.push_back(features.is_open.empty() || features.is_open[s] == 0 ? 1 : 0);
+    if (features.faces == FaceRule::kUnion) {
+      made.groups.push_back(features.groups.empty() ? 0 : features.groups[s]);
+    }
   }
   if (box != nullptr) {
     const auto first = static_cast<uint32_t>(made.points.size());

@@ -20,7 +20,8 @@ struct BoundingSegments {
   std::vector<Point<2>> points;
   std::vector<std::array<uint32_t, 2>> ends;
   std::vector<uint8_t> is_ring;
-  uint32_t given = 0;  // so many come from the file; then the sides of the box follow
+  std::vector<uint32_t> groups;  // of each; none but of FaceRule::kUnion
+  uint32_t given = 0;            // so many come from the file; then the sides of the box follow
 
   // "segments[3]" or "a side of the box".
   std::string NameOf(uint32_t segment) const;

@@ -22,6 +22,7 @@
 #include "core/simplex/boundary.h"
 #include "core/validate/domain_pieces.h"
 #include "core/validate/face_sweep.h"
+#include "core/validate/merged_domain.h"
 #include "core/validate/polygon_search.h"
 #include "core/validate/validate_domain.h"
 
@@ -197,6 +198,8 @@ class ConformityCheck {
 
   absl::Status Run() {
     WELLSPACE_RETURN_IF_ERROR(CheckShapes());
+    WELLSPACE_ASSIGN_OR_RETURN(
+        points_, PlacesInMesh(domain_.points, features_, mesh_.points, domain_.merge_distance, tolerance_, context_));
     WELLSPACE_RETURN_IF_ERROR(Cut());
     WELLSPACE_ASSIGN_OR_RETURN(patches_, FindPatches(mesh_, parts_.boundary.facets, context_));
     WELLSPACE_RETURN_IF_ERROR(Sweep());
@@ -228,6 +231,14 @@ class ConformityCheck {
           absl::StrCat("expected a tag for each of ", facets, " facets and a region for each of ", triangles,
                        " triangles, or none; got ", parts_.boundary.tags.size(), " and ", parts_.regions.size()));
     }
+    for (const uint32_t end : features_.ends) {
+      if (end >= domain_.points.size() / 2) {
+        return absl::InvalidArgumentError("segments: an end is no point");
+      }
+    }
+    if (!features_.groups.empty() && features_.groups.size() != features_.segment_count()) {
+      return absl::InvalidArgumentError("segments: there is not one group for each, nor none");
+    }
     for (const FaceSeed& seed : features_.seeds) {
       if (uint64_t{seed.first_segment} + seed.segment_count > features_.segment_count()) {
         return absl::InvalidArgumentError("seeds: a polygon has segments that are not there");
@@ -247,7 +258,7 @@ class ConformityCheck {
       }
     };
     include(mesh_.points);
-    include(domain_.points);
+    include(points_);
     centre_ = {0.5 * box.low[0] + 0.5 * box.high[0], 0.5 * box.low[1] + 0.5 * box.high[1]};
     const double room = box.LongestSide();
     for (const FaceSeed& seed : features_.seeds) {
@@ -257,7 +268,7 @@ class ConformityCheck {
       }
     }
     box = domain_.box.value_or(box);
-    segments_ = SegmentsOf(domain_.points, features_, features_.faces == FaceRule::kBox ? &box : nullptr);
+    segments_ = SegmentsOf(points_, features_, features_.faces == FaceRule::kBox ? &box : nullptr);
     WELLSPACE_ASSIGN_OR_RETURN(made_,
                                CutSegments(mesh_.points, parts_.boundary.facets, segments_, tolerance_, context_));
     return absl::OkStatus();
@@ -276,8 +287,8 @@ class ConformityCheck {
     std::vector<Point<2>> vertices(made_.vertices.begin(),
                                    made_.vertices.begin() + static_cast<std::ptrdiff_t>(mesh_.points.size() / 2));
     WELLSPACE_RETURN_IF_ERROR(CancellableSort(vertices, std::less<>(), context_));
-    for (uint32_t i = 0; i < domain_.points.size() / 2; ++i) {
-      if (const Point<2> p = PointAt<2>(domain_.points, i); !std::binary_search(vertices.begin(), vertices.end(), p)) {
+    for (uint32_t i = 0; i < points_.size() / 2; ++i) {
+      if (const Point<2> p = PointAt<2>(points_, i); !std::binary_search(vertices.begin(), vertices.end(), p)) {
         places_.push_back(p);
         no_vertices_.push_back(i);
       }
@@ -335,6 +346,9 @@ class ConformityCheck {
   }
 
   absl::Status ApplyRule() {
+    if (features_.faces == FaceRule::kUnion) {
+      return ApplyUnion();
+    }
     for (size_t face = 1; face < faces_.size(); ++face) {
       faces_[face].is_meshed = features_.faces != FaceRule::kEvenOdd;
     }
@@ -342,12 +356,7 @@ class ConformityCheck {
       return absl::OkStatus();
     }
     // From the unbounded face on, across pieces.
-    std::vector<std::vector<uint32_t>> sides(faces_.size());
-    for (uint32_t p = 0; p < made_.pieces.size(); ++p) {
-      for (const uint32_t face : swept_.beside[p]) {
-        sides[face].push_back(p);
-      }
-    }
+    const std::vector<std::vector<uint32_t>> sides = SidesOfFaces();
     std::vector<bool> is_known(faces_.size());
     std::vector<uint32_t> pending = {0};
     is_known[0] = true;
@@ -372,11 +381,65 @@ class ConformityCheck {
     return absl::OkStatus();
   }
 
+  // The pieces beside each face.
+  std::vector<std::vector<uint32_t>> SidesOfFaces() const {
+    std::vector<std::vector<uint32_t>> sides(faces_.size());
+    for (uint32_t p = 0; p < made_.pieces.size(); ++p) {
+      for (const uint32_t face : swept_.beside[p]) {
+        sides[face].push_back(p);
+      }
+    }
+    return sides;
+  }
+
+  // Goes over pieces from face to face and back, with the groups that surround the face an odd number of times.
+  absl::Status ApplyUnion() {
+    struct Stop {
+      uint32_t face;
+      uint32_t entered_over;  // a piece
+      size_t next = 0;        // of its pieces
+    };
+    const std::vector<std::vector<uint32_t>> sides = SidesOfFaces();
+    std::set<uint32_t> around;
+    const auto cross = [&](uint32_t piece) {
+      for (const uint32_t group : made_.pieces[piece].groups) {
+        if (around.erase(group) == 0) {
+          around.insert(group);
+        }
+      }
+    };
+    std::vector<bool> is_known(faces_.size());
+    std::vector<Stop> way = {{0, kNone}};
+    is_known[0] = true;
+    for (size_t steps = 0; !way.empty(); ++steps) {
+      if (steps % kStepsBetweenLooks == 0) {
+        WELLSPACE_RETURN_IF_ERROR(context_.Check());
+      }
+      Stop& here = way.back();
+      if (here.next == sides[here.face].size()) {
+        if (here.entered_over != kNone) {
+          cross(here.entered_over);
+        }
+        way.pop_back();
+        continue;
+      }
+      const uint32_t piece = sides[here.face][here.next++];
+      const uint32_t beyond = swept_.beside[piece][0] == here.face ? swept_.beside[piece][1] : swept_.beside[piece][0];
+      if (!is_known[beyond]) {
+        is_known[beyond] = true;
+        cross(piece);
+        faces_[beyond].is_meshed = !around.empty();
+        way.push_back({beyond, piece});
+      }
+    }
+    return absl::OkStatus();
+  }
+
   absl::Status ApplySeeds() {
     const size_t patches = patches_.largest.size();
     WELLSPACE_ASSIGN_OR_RETURN(
         const std::vector<uint32_t> polygons,
-        FindPolygonsAround(std::span<const Point<2>>(places_).first(patches), domain_.points, features_, context_));
+        FindPolygonsAround(std::span<const Point<2>>(places_).first(patches), points_, features_, context_));
     for (uint32_t i = 0; i < patches; ++i) {
       faces_[swept_.face_of[i]].seed = polygons[i] == kInNoPolygon ? kNone : polygons[i];
     }
@@ -403,8 +466,9 @@ class ConformityCheck {
     const uint32_t seed = faces_[number].seed;
     return seed != kNone && features_.seeds[seed].is_hole
                ? absl::StrCat("it is in the face of seeds[", seed, "], a hole")
-           : number == 0 ? "it is in the unbounded face, which segments do not enclose"
-                         : "an even number of rings surrounds it";
+           : number == 0                         ? "it is in the unbounded face, which segments do not enclose"
+           : features_.faces == FaceRule::kUnion ? "no group has an odd number of rings around it"
+                                                 : "an even number of rings surrounds it";
   }
 
   // Faces that are to be meshed have triangles, and others have none.
@@ -501,6 +565,7 @@ class ConformityCheck {
   const Features& features_;
   const double tolerance_;
   const RunContext& context_;
+  std::vector<double> points_;  // of the domain, as the mesh has them
   Point<2> centre_{};
   BoundingSegments segments_;
   DomainPieces made_;

@@ -21,10 +21,11 @@ namespace wellspace::core {
 // A domain, as its file has it.
 struct DomainView {
   std::span<const double> points;  // n x 2, row-major
-  Features features{};             // crossings are not looked at
+  Features features{};             // crossings and the snap distance are not looked at
   bool has_markers = true;         // if not, markers are not known, rather than 0
   bool has_regions = true;         // if not, regions are not known, rather than 0
   std::optional<Box<2>> box{};     // of FaceRule::kBox, if it is known
+  double merge_distance = 0;       // of points; 0: equal ones alone, and corners of rings within the tolerance
 };
 
 // What is told of a mesh of a domain beside its triangles.
@@ -56,7 +57,8 @@ absl::StatusOr<DomainReport> ValidateDomainMesh(const MeshView& mesh, std::span<
 // have the region of their face, and are no larger than it allows; facets have the tags of their segments, as the
 // proto's BoundaryPart says. Faces are found here once more, without the mesher's code. Each stretch of a segment is
 // looked at by itself: one may bound a face that is meshed, and the next one nothing. Places are compared up to
-// `tolerance`, which is what a split segment is bent by.
+// `tolerance`, which is what a split segment is bent by: of segments that are led through points a distance away, as
+// much as that. Points that are merged are looked for where they are then.
 //
 // With FaceRule::kBox a box that is not known is taken for that of the mesh and the points, and for one that reaches
 // beyond seeds outside of these: what is not meshed beside its true sides may then be taken for missing. A face that is

@@ -24,6 +24,9 @@ bool RuleFromProto(v1::FaceRule rule, core::FaceRule* out) {
     case v1::FACE_RULE_EVEN_ODD:
       *out = core::FaceRule::kEvenOdd;
       return true;
+    case v1::FACE_RULE_UNION:
+      *out = core::FaceRule::kUnion;
+      return true;
     default:
       return false;
   }
@@ -82,6 +85,7 @@ void SetFeatures(const FeatureSummary& summary, store::v1::SessionRecord& record
   record.set_has_rules(summary.has_rules);
   record.set_faces(summary.faces);
   record.set_crossings(summary.crossings);
+  record.set_snap_distance(summary.snap_distance);
 }
 
 absl::Status NotInThePlane(const char* field, int dimension) {
@@ -103,22 +107,41 @@ absl::Status CheckSegments(const v1::SegmentChunk& chunk, uint64_t first) {
                                   count, " segments; expected one for each, or none"),
                      "segments.markers");
   }
+  if (chunk.groups_size() != 0 && chunk.groups_size() != count) {
+    return MakeError(v1::ERROR_REASON_INVALID_CHUNK_SHAPE,
+                     absl::StrCat("the chunk after segment ", first, " has ", chunk.groups_size(), " groups and ",
+                                  count, " segments; expected one for each, or none"),
+                     "segments.groups");
+  }
   return absl::OkStatus();
 }
 
 absl::Status CheckFaces(const v1::FaceOptions& options, uint64_t first) {
   core::FaceRule rule;
   if (!RuleFromProto(options.faces(), &rule)) {
-    return MakeError(v1::ERROR_REASON_INVALID_SEGMENTS,
-                     absl::StrCat("faces: ", static_cast<int>(options.faces()),
-                                  " is not known; 1 (box), 2 (holes) and 3 (even-odd) are, and 0 for the default"),
-                     "faces.faces");
+    return MakeError(
+        v1::ERROR_REASON_INVALID_SEGMENTS,
+        absl::StrCat("faces: ", static_cast<int>(options.faces()),
+                     " is not known; 1 (box), 2 (holes), 3 (even-odd) and 4 (union) are, and 0 for the default"),
+        "faces.faces");
   }
   if (options.crossings() < v1::CROSSING_RULE_UNSPECIFIED || options.crossings() > v1::CROSSING_RULE_SNAP) {
     return MakeError(v1::ERROR_REASON_INVALID_SEGMENTS,
                      absl::StrCat("crossings: ", static_cast<int>(options.crossings()),
                                   " is not known; 1 (refuse), 2 (split) and 3 (snap) are, and 0 for the default"),
                      "faces.crossings");
+  }
+  if (options.has_snap_distance() && !(options.snap_distance() >= 0 && std::isfinite(options.snap_distance()))) {
+    return MakeError(v1::ERROR_REASON_INVALID_SEGMENTS,
+                     absl::StrCat("snap_distance: ", options.snap_distance(), " is not a finite number of at least 0"),
+                     "faces.snap_distance");
+  }
+  if (options.snap_distance() > 0 && RuleFromProto(options.crossings()) == core::CrossingRule::kRefuse) {
+    return MakeError(v1::ERROR_REASON_INVALID_SEGMENTS,
+                     absl::StrCat("snap_distance: it is ", options.snap_distance(),
+                                  ", and crossings 1 (refuse) leads no segment through a point; take 3 (snap) or 2 "
+                                  "(split), or leave it out"),
+                     "faces.snap_distance");
   }
   for (int i = 0; i < options.seeds_size(); ++i) {
     WELLSPACE_RETURN_IF_ERROR(CheckSeed(options.seeds(i), first + i));
@@ -132,12 +155,17 @@ void FeatureStore::Append(const v1::SegmentChunk& chunk, uint64_t known) {
   ends_.MakeRoom(2 * count);
   markers_.MakeRoom(count);
   is_open_.MakeRoom(count);
+  groups_.MakeRoom(count);
   ends_.Append(chunk.ends().begin() + 2 * skipped, chunk.ends().end());
   if (chunk.markers_size() != 0) {
     markers_.Append(chunk.markers().begin() + skipped, chunk.markers().end());
   }
+  if (chunk.groups_size() != 0) {
+    groups_.Append(chunk.groups().begin() + skipped, chunk.groups().end());
+  }
   markers_.Resize(segment_count());
   is_open_.Resize(segment_count(), chunk.open() ? 1 : 0);
+  groups_.Resize(segment_count());
 }
 
 void FeatureStore::Append(const v1::FaceOptions& options, uint64_t known) {
@@ -145,6 +173,7 @@ void FeatureStore::Append(const v1::FaceOptions& options, uint64_t known) {
   has_rules_ = true;
   (void)RuleFromProto(options.faces(), &faces_);
   crossings_ = RuleFromProto(options.crossings());
+  snap_distance_ = options.snap_distance();
   for (auto i = static_cast<int>(known); i < options.seeds_size(); ++i) {
     seeds_.Append(SeedFromProto(options.seeds(i)));
   }
@@ -155,8 +184,9 @@ uint64_t FeatureStore::CountEqual(uint64_t first, uint64_t count, const v1::Segm
     const uint64_t s = first + i;
     const auto at = static_cast<int>(i);
     const int32_t marker = chunk.markers_size() == 0 ? 0 : chunk.markers(at);
-    if (ends_[2 * s] != chunk.ends(2 * at) || ends_[2 * s + 1] != chunk.ends(2 * at + 1) || markers_[s] != marker ||
-        (is_open_[s] != 0) != chunk.open()) {
+    const uint32_t group = chunk.groups_size() == 0 ? 0 : chunk.groups(at);
+    if (groups_[s] != group || ends_[2 * s] != chunk.ends(2 * at) || ends_[2 * s + 1] != chunk.ends(2 * at + 1) ||
+        markers_[s] != marker || (is_open_[s] != 0) != chunk.open()) {
       return i;
     }
   }
@@ -175,17 +205,20 @@ uint64_t FeatureStore::CountEqual(uint64_t first, uint64_t count, const v1::Face
 bool FeatureStore::HasOtherRules(const v1::FaceOptions& options) const {
   core::FaceRule rule = core::FaceRule::kBox;
   (void)RuleFromProto(options.faces(), &rule);
-  return IsEmpty() || rule != faces_ || RuleFromProto(options.crossings()) != crossings_;
+  return IsEmpty() || rule != faces_ || RuleFromProto(options.crossings()) != crossings_ ||
+         options.snap_distance() != snap_distance_;
 }
 
 void FeatureStore::TakeBack(const FeatureSummary& before) {
   ends_.Resize(2 * before.segments);
   markers_.Resize(before.segments);
   is_open_.Resize(before.segments);
+  groups_.Resize(before.segments);
   seeds_.Resize(before.seeds);
   has_rules_ = before.has_rules;
   (void)RuleFromProto(before.faces, &faces_);
   crossings_ = RuleFromProto(before.crossings);
+  snap_distance_ = before.snap_distance;
 }
 
 FeatureSummary FeatureStore::Summary() const {
@@ -193,13 +226,15 @@ FeatureSummary FeatureStore::Summary() const {
           .seeds = seed_count(),
           .has_rules = has_rules_,
           .faces = face_rule(),
-          .crossings = crossing_rule()};
+          .crossings = crossing_rule(),
+          .snap_distance = snap_distance_};
 }
 
 v1::FaceRule FeatureStore::face_rule() const {
   return IsEmpty()                            ? v1::FACE_RULE_UNSPECIFIED
          : faces_ == core::FaceRule::kHoles   ? v1::FACE_RULE_HOLES
          : faces_ == core::FaceRule::kEvenOdd ? v1::FACE_RULE_EVEN_ODD
+         : faces_ == core::FaceRule::kUnion   ? v1::FACE_RULE_UNION
                                               : v1::FACE_RULE_BOX;
 }
 
@@ -217,9 +252,11 @@ std::optional<core::Features> FeatureStore::View() const {
   return core::Features{.ends = ends_,
                         .markers = markers_,
                         .is_open = is_open_,
+                        .groups = groups_,
                         .seeds = seeds_,
                         .faces = faces_,
-                        .crossings = crossings_};
+                        .crossings = crossings_,
+                        .snap_distance = snap_distance_};
 }
 
 }  // namespace wellspace::server

@@ -33,6 +33,7 @@ struct FeatureSummary {
   bool has_rules = false;  // some have come
   v1::FaceRule faces = v1::FACE_RULE_UNSPECIFIED;
   v1::CrossingRule crossings = v1::CROSSING_RULE_UNSPECIFIED;
+  double snap_distance = 0;
 
   // Whether a box bounds what is meshed: so it does where there are no features.
   bool AreInBox() const { return faces == v1::FACE_RULE_UNSPECIFIED || faces == v1::FACE_RULE_BOX; }
@@ -74,7 +75,7 @@ class FeatureStore {
   uint64_t seed_count() const { return seeds_.size(); }
   uint64_t bytes() const { return BytesOf(segment_count(), seed_count()); }
   static uint64_t BytesOf(uint64_t segments, uint64_t seeds) {
-    return segments * (2 * sizeof(uint32_t) + sizeof(int32_t) + sizeof(uint8_t)) + seeds * sizeof(core::FaceSeed);
+    return segments * (3 * sizeof(uint32_t) + sizeof(int32_t) + sizeof(uint8_t)) + seeds * sizeof(core::FaceSeed);
   }
 
   // For core::Input: none where this is empty. Valid until the next Append.
@@ -89,9 +90,11 @@ class FeatureStore {
   GrowingArray<uint32_t> ends_;
   GrowingArray<int32_t> markers_;
   GrowingArray<uint8_t> is_open_;
+  GrowingArray<uint32_t> groups_;
   GrowingArray<core::FaceSeed> seeds_;
   core::FaceRule faces_ = core::FaceRule::kBox;
   core::CrossingRule crossings_ = core::CrossingRule::kRefuse;
+  double snap_distance_ = 0;
 };
 
 }  // namespace wellspace::server

@@ -53,6 +53,9 @@ v1::Session Session::DescribeWithLocked(const std::map<std::string, std::string>
   message.set_seed_count(feature_summary_.seeds);
   message.set_faces(feature_summary_.faces);
   message.set_crossings(feature_summary_.crossings);
+  if (feature_summary_.snap_distance > 0) {
+    message.set_snap_distance(feature_summary_.snap_distance);
+  }
   message.set_size_count(sizes_in_use_.count);
   if (work_.mesh != nullptr) {
     message.set_vertex_count(work_.mesh->figures().vertices);

@@ -131,6 +131,9 @@ absl::Status Session::CommitFeatures(const v1::AddSegmentsRequest& request, uint
     if (request.segments().markers_size() != 0) {
       step.mutable_segments()->mutable_markers()->ExtractSubrange(0, static_cast<int>(known_segments), nullptr);
     }
+    if (request.segments().groups_size() != 0) {
+      step.mutable_segments()->mutable_groups()->ExtractSubrange(0, static_cast<int>(known_segments), nullptr);
+    }
     if (request.has_faces()) {
       *step.mutable_faces() = request.faces();
       step.mutable_faces()->mutable_seeds()->DeleteSubrange(0, static_cast<int>(known_seeds));

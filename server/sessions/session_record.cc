@@ -89,7 +89,8 @@ void Session::SetState(const StoredSession& stored) {
                       .seeds = state.seeds(),
                       .has_rules = state.has_rules(),
                       .faces = state.faces(),
-                      .crossings = state.crossings()};
+                      .crossings = state.crossings(),
+                      .snap_distance = state.snap_distance()};
   sizes_in_use_ = {.number = state.sizes(), .count = state.size_count()};
   sizes_revision_ = sizes_in_use_.number;
   const std::vector<SizesInUse> sizes = UnusedSizesLocked({}, 0);  // all of them

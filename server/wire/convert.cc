@@ -114,6 +114,8 @@ void SetDomain(const core::DomainStatistics& domain, v1::DomainStatistics& messa
   message.set_near_points(domain.near_points);
   message.set_exempt_simplices(domain.exempt_simplices);
   message.set_min_input_angle_deg(domain.min_input_angle_deg);
+  message.set_unused_seeds(domain.unused_seeds);
+  message.set_first_unused_seed(domain.first_unused_seed);
 }
 
 v1::MeshStatistics StatisticsToProto(const core::MeshStatistics& statistics) {

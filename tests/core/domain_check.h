@@ -131,7 +131,9 @@ inline absl::Status CheckAgainst(const DomainInput& input, const DomainMesh& mes
   if (!input.parameters.domain_low.empty()) {
     domain.box = {core::PointAt<2>(input.parameters.domain_low, 0), core::PointAt<2>(input.parameters.domain_high, 0)};
   }
-  return core::ValidateConformity(mesh.View(), mesh.Parts(), domain, 0x1p-40 * size, context);
+  domain.merge_distance = input.parameters.merge_distance;
+  return core::ValidateConformity(mesh.View(), mesh.Parts(), domain, std::max(0x1p-40 * size, 2 * input.snap_distance),
+                                  context);
 }
 
 }  // namespace wellspace::test

@@ -437,5 +437,69 @@ TEST_F(DomainEditingTest, RandomPointsAreMeshedWhereTrianglesAre) {
   ExpectValid(input, Refined(input, *mesher), given);
 }
 
+TEST_F(DomainEditingTest, WithAMergeDistancePointsBecomeVerticesThatAreNear) {
+  Input input = Plate();
+  input.parameters.merge_distance = 0.01;
+  input.points.insert(input.points.end(), {2.001, 2.001, 0.25, 0.2501});  // a corner, and the end of a segment
+  const auto mesher = input.Create();
+  const Mesh before = Refined(input, *mesher);
+  EXPECT_EQ(before.statistics.merged_points, 2u);
+  EXPECT_EQ(before.input_vertex[10], before.input_vertex[2]);
+  EXPECT_EQ(before.input_vertex[11], before.input_vertex[8]);
+  // Near to a corner from inside, near to a segment's end on either side, and one that is near to none.
+  const std::vector<double> added = {1.999, 1.999, 0.251, 0.251, 0.249, 0.25, 1.7, 1.8};
+  const auto vertices = mesher->AddPoints(added, context_);
+  ASSERT_TRUE(vertices.ok()) << vertices.status();
+  EXPECT_EQ((*vertices)[0], before.input_vertex[2]);
+  EXPECT_EQ((*vertices)[1], before.input_vertex[8]);
+  EXPECT_EQ((*vertices)[2], before.input_vertex[8]);
+  EXPECT_EQ((*vertices)[3], before.vertex_count());
+  const Mesh after = Refined(input, *mesher);
+  EXPECT_EQ(after.statistics.merged_points, 5u);
+  EXPECT_EQ(after.statistics.duplicates, 0u);
+  EXPECT_EQ(after.input_vertex.size(), 16u);
+}
+
+TEST_F(DomainEditingTest, MergingDoesNotDependOnTheOrderOfPoints) {
+  for (int run = 0; run < 20; ++run) {
+    Input input;
+    input.faces = FaceRule::kUnion;
+    input.parameters.merge_distance = 0.02;
+    input.crossings = CrossingRule::kSplit;
+    input.snap_distance = 0.02;
+    for (int ring = 0; ring < 3; ++ring) {
+      const auto place = [&] { return Point<2>{random_.Unit(), random_.Unit()}; };
+      input.Ring({place(), place(), place(), place()});
+      input.groups.resize(input.ends.size() / 2, static_cast<uint32_t>(ring));
+    }
+    // The same, from the last point and the last segment to the first.
+    Input turned = input;
+    const auto last = static_cast<uint32_t>(input.points.size() / 2 - 1);
+    for (uint32_t i = 0; i <= last; ++i) {
+      turned.points[2 * i] = input.points[2 * (last - i)];
+      turned.points[2 * i + 1] = input.points[2 * (last - i) + 1];
+    }
+    for (size_t i = 0; i < input.ends.size(); ++i) {
+      turned.ends[i] = last - input.ends[input.ends.size() - 1 - i];
+    }
+    std::reverse(turned.groups.begin(), turned.groups.end());
+    const auto one = input.Make();
+    const auto two = turned.Make();
+    ASSERT_EQ(one.ok(), two.ok()) << one.status() << two.status();
+    if (one.ok()) {
+      const auto places = [](const Mesh& mesh) {
+        std::set<Point<2>> all;
+        for (uint32_t v = 0; v < mesh.vertex_count(); ++v) {
+          all.insert(At(mesh, v));
+        }
+        return all;
+      };
+      EXPECT_EQ(places(*one), places(*two));
+      EXPECT_EQ(one->simplex_count(), two->simplex_count());
+      EXPECT_EQ(one->statistics.merged_points, two->statistics.merged_points);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace wellspace::core

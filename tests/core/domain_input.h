@@ -29,6 +29,8 @@ struct DomainInput {
   core::FaceRule faces = core::FaceRule::kHoles;
   core::CrossingRule crossings = core::CrossingRule::kRefuse;
   core::MeshParameters parameters{.dimension = 2};
+  std::vector<uint32_t> groups{};
+  double snap_distance = 0;
 
   DomainInput& Ring(const std::vector<core::Point<2>>& corners, int32_t marker = 0) {
     const auto first = static_cast<uint32_t>(points.size() / 2);
@@ -64,6 +66,8 @@ struct DomainInput {
     made.seeds = seeds;
     made.faces = faces;
     made.crossings = crossings;
+    made.groups = groups;
+    made.snap_distance = snap_distance;
     return made;
   }
   absl::StatusOr<core::Mesh> Make() const {

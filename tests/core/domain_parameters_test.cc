@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <limits>
 #include <string>
 
 namespace wellspace::core {
@@ -23,9 +25,16 @@ TEST(ValidateDomainParameters, NamesWhatADomainDoesNotHave) {
   parameters.criterion = Criterion::kWellSpaced;
   EXPECT_THAT(std::string(ValidateDomainParameters(parameters, holes).message()), StartsWith("criterion:"));
   parameters = InThePlane();
-  parameters.merge_distance = 0.5;
-  EXPECT_THAT(std::string(ValidateDomainParameters(parameters, holes).message()), StartsWith("merge_distance:"));
-  parameters = InThePlane();
+  Features snapped = holes;
+  snapped.crossings = CrossingRule::kSnap;
+  for (const double distance : {-1.0, std::numeric_limits<double>::infinity(), std::nan("")}) {
+    snapped.snap_distance = distance;
+    EXPECT_THAT(std::string(ValidateDomainParameters(parameters, snapped).message()), StartsWith("snap_distance:"));
+  }
+  snapped.snap_distance = 0.5;
+  EXPECT_TRUE(ValidateDomainParameters(parameters, snapped).ok());
+  snapped.crossings = CrossingRule::kRefuse;
+  EXPECT_THAT(std::string(ValidateDomainParameters(parameters, snapped).message()), StartsWith("snap_distance:"));
   parameters.rho = 0.5;
   EXPECT_THAT(std::string(ValidateDomainParameters(parameters, holes).message()), StartsWith("rho:"));
 }

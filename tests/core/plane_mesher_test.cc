@@ -292,8 +292,8 @@ TEST(PlaneMesherTest, ParametersThatADomainDoesNotHaveAreRefused) {
   input.parameters.criterion = Criterion::kWellSpaced;
   EXPECT_THAT(input.Make().status().message(), HasSubstr("criterion"));
   input = square;
-  input.parameters.merge_distance = 0.1;
-  EXPECT_THAT(input.Make().status().message(), HasSubstr("merge_distance"));
+  input.snap_distance = 0.1;
+  EXPECT_THAT(input.Make().status().message(), HasSubstr("snap_distance"));
   input = square;
   input.parameters.domain_low = {0, 0};
   input.parameters.domain_high = {1, 1};

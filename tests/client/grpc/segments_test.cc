@@ -25,6 +25,7 @@ Features MakeChain() {
     features.ends.insert(features.ends.end(), {s, s + 1});
     features.markers.push_back(static_cast<int32_t>(s % 5));
     features.is_open.push_back(s >= 100 && s < 300 ? 1 : 0);
+    features.groups.push_back(s / 7);
   }
   for (size_t i = 0; i < kSeeds; ++i) {
     features.seeds.push_back(
@@ -44,6 +45,7 @@ class FakeDomain {
     features_.ends = {7, 8};
     features_.markers = {1};
     features_.is_open = {0};
+    features_.groups = {0};
     server.sessions.get = [this](const v1::GetSessionRequest& request, v1::GetSessionResponse& response) {
       std::lock_guard lock(mutex_);
       response.mutable_session()->set_name(request.name());
@@ -87,6 +89,7 @@ class FakeDomain {
         features_.ends.insert(features_.ends.end(), {chunk.ends(2 * i), chunk.ends(2 * i + 1)});
         features_.markers.push_back(chunk.markers(i));
         features_.is_open.push_back(chunk.open() ? 1 : 0);
+        features_.groups.push_back(chunk.groups(i));
       }
     }
     for (int i = 0; i < request.faces().seeds_size(); ++i) {

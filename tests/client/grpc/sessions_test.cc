@@ -44,7 +44,8 @@ v1::Session MakeSession() {
   session.set_last_operation(kOperation);
   session.set_segment_count(7);
   session.set_seed_count(8);
-  session.set_faces(v1::FACE_RULE_EVEN_ODD);
+  session.set_faces(v1::FACE_RULE_UNION);
+  session.set_snap_distance(0.5);
   session.set_crossings(v1::CROSSING_RULE_SPLIT);
   return session;
 }
@@ -69,7 +70,8 @@ void ExpectIsTheSession(const Session& session) {
   EXPECT_EQ(session.last_operation, kOperation);
   EXPECT_EQ(session.segment_count, 7u);
   EXPECT_EQ(session.seed_count, 8u);
-  EXPECT_EQ(session.faces, FaceRule::kEvenOdd);
+  EXPECT_EQ(session.faces, FaceRule::kUnion);
+  EXPECT_EQ(session.snap_distance, 0.5);
   EXPECT_EQ(session.crossings, CrossingRule::kSplit);
 }
 

@@ -118,6 +118,10 @@ class ArraysTest(Case):
             np.testing.assert_array_equal(found, [[0, 1], [2, 3]])
             self.assertTrue(found.flags.c_contiguous and found.dtype == np.float64)
 
+    def test_whole_numbers_that_doubles_are_stay(self):
+        large = np.array([[0, 2**53], [2**60, -(2**62)]])
+        np.testing.assert_array_equal(_arrays.coordinates(large, "points"), large)
+
     def test_wrong_points(self):
         nan = np.zeros((5, 3))
         nan[3, 1] = np.nan
@@ -132,6 +136,8 @@ class ArraysTest(Case):
             ([[0j, 1]], "points[0] is", "points[0]"),
             ("points.csv", "expected numbers", "points"),
             (np.ma.masked_array([[0.0, 1], [2, 3]], mask=[[0, 0], [0, 1]]), "points[1] is masked", "points[1]"),
+            (np.array([[0, 1], [2**53 + 1, 3]]), "points[1] has 9007199254740993, which no double is", "points[1]"),
+            (np.array([[0, 1], [2, 2**64 - 1]], np.uint64), "points[1] has 18446744073709551615", "points[1]"),
         ):
             with self.subTest(points), self.fails(InvalidArgumentError, message, field=field):
                 _arrays.coordinates(points, "points")
@@ -161,7 +167,7 @@ class ArraysTest(Case):
             ({"regions": [(1, 1, 1, 0)]}, "max_area 0; expected a number above 0, or nothing", "regions[0]"),
             ({"regions": [(1, 1, 1, -1.0)]}, "max_area -1.0", "regions[0]"),
             ({"regions": [(1, np.nan)]}, "nan", "regions[0][0]"),
-            ({"faces": "even_odd"}, "'box', 'holes', 'even-odd'", "faces"),
+            ({"faces": "even_odd"}, "'box', 'holes', 'even-odd', 'union'", "faces"),
             ({"crossings": "ignore"}, "'refuse', 'split'", "crossings"),
         ):
             with self.subTest(given), self.fails(InvalidArgumentError, message, field=field):

@@ -29,12 +29,50 @@ class DomainTest(Case):
             ({}, 16),
             ({"faces": "holes", "holes": [[2, 2]]}, 15),
             ({"faces": "even-odd"}, 15),
+            ({"faces": "union"}, 15),
+            ({"faces": "union", "groups": [3, 3, 3, 3, 8, 8, 8, 8]}, 16),
             ({"faces": "box", "box": ([-1, -1], [5, 5])}, 36),
             ({"box": ([-1, -1], [5, 5])}, 36),
         ):
             with self.subTest(given):
                 mesh = wellspace.mesh(POINTS, segments=RINGS, **given)
                 self.assertAlmostEqual(volume(mesh) / 2, area)
+
+    def test_groups_and_snap_distance_are_checked(self):
+        for given, field, text in (
+            ({"groups": [1, 2]}, "groups", "expected 8 whole numbers"),
+            ({"groups": [0.5] * 8}, "groups", "whole numbers"),
+            ({"groups": [0] * 7 + [-1]}, "groups", "groups[7] is -1"),
+            ({"snap_distance": -1}, "snap_distance", "at least 0"),
+            ({"snap_distance": float("nan")}, "snap_distance", "finite"),
+        ):
+            with self.subTest(given), self.fails(InvalidArgumentError, text, field=field):
+                wellspace.mesh(POINTS, segments=RINGS, **given)
+        with self.fails(InvalidArgumentError, "snap_distance", reason="INVALID_SEGMENTS"):
+            wellspace.mesh(POINTS, segments=RINGS, snap_distance=0.1)
+
+    def test_near_points(self):
+        # A triangle beside the square, of which a corner is nearly one of the square and another near to its side.
+        points = np.vstack([POINTS[:4], [[4.001, 4], [6, 2], [4.002, 1]]])
+        segments = np.vstack([RINGS[:4], [[4, 5], [5, 6], [6, 4]]])
+        arguments = {"segments": segments, "merge_distance": 0.01, "crossings": "snap", "snap_distance": 0.01}
+        with wellspace.Session(2, merge_distance=0.01) as session:
+            session.upload(points)
+            session.add_segments(**{k: v for k, v in arguments.items() if k != "merge_distance"})
+            session.refine()
+            of_session = session.download()
+        for mesh in (wellspace.mesh(points, **arguments), of_session):
+            self.assertEqual(mesh.statistics.merged_points, 1)
+            self.assertEqual(mesh.input_vertices[4], mesh.input_vertices[2])
+            self.assertEqual(mesh.statistics.domain.near_points, 1)
+            self.assertAlmostEqual(volume(mesh) / 2, 16 + 3 * 2 / 2, places=1)
+        twins = np.vstack([POINTS[:4], [[4, np.nextafter(4, 5)], [6, 2], [5, 1]]])
+        self.assertEqual(wellspace.mesh(twins, segments=segments).statistics.merged_points, 1)
+
+    def test_seeds_outside_are_counted(self):
+        mesh = wellspace.mesh(POINTS, segments=RINGS, holes=[[2, 2], [9, 9]])
+        self.assertEqual(mesh.statistics.domain.unused_seeds, 1)
+        self.assertEqual(mesh.statistics.domain.first_unused_seed, 1)
 
     def test_regions(self):
         regions = [(0.5, 0.5, 3), RegionSeed(2, 2, region=5, max_area=0.01)]

@@ -100,6 +100,14 @@ class SizesTest(Case):
                 session.sizes([1, 2, 3])
             with self.fails(InvalidArgumentError, "values[2]"):
                 session.sizes([1, 2, -3])
+            for values, text in (
+                ([1, np.nan, 1], "values[1] is nan"),
+                ([1, 1, np.inf], "values[2] is inf"),
+                (np.ma.masked_array([1.0, 2, 3], mask=[0, 1, 0]), "values[1] is masked"),
+                ([1, 2**53 + 1, 1], "values[1] has 9007199254740993"),
+            ):
+                with self.subTest(text), self.fails(InvalidArgumentError, text):
+                    session.sizes(values)
             self.assertEqual(session.info().size_count, 0)
 
 

@@ -25,6 +25,8 @@ struct Drawing {
   std::vector<double> points;
   std::vector<uint32_t> ends;
   std::vector<uint8_t> is_open;
+  std::vector<uint32_t> groups;  // what comes next is of `group`
+  uint32_t group = 0;
   std::vector<FaceSeed> seeds;
   FaceRule rule = FaceRule::kHoles;
   PlanarGraph graph;
@@ -41,8 +43,14 @@ struct Drawing {
       if (i + 1 < count || is_closed) {
         ends.insert(ends.end(), {first + i, first + (i + 1) % count});
         is_open.push_back(is_closed ? 0 : 1);
+        groups.push_back(group);
       }
     }
+    return *this;
+  }
+
+  Drawing& Group(uint32_t number) {
+    group = number;
     return *this;
   }
 
@@ -57,6 +65,8 @@ struct Drawing {
     Features features;
     features.ends = ends;
     features.is_open = is_open;
+    features.groups = groups;
+    features.faces = rule;
     features.crossings = CrossingRule::kSplit;
     features.seeds = seeds;
     absl::StatusOr<PlanarGraph> made = MakePlanarGraph(points, features, nullptr, 1e-12, 1'000'000, 1, RunContext());
@@ -116,6 +126,32 @@ TEST(PlanarFacesTest, IslandsInLakesInIslandsByEvenAndOdd) {
   EXPECT_FALSE(faces->faces[FaceAt(drawing, {1.5, 5})].is_meshed);
   EXPECT_TRUE(faces->faces[FaceAt(drawing, {2.5, 5})].is_meshed);
   EXPECT_FALSE(faces->faces[FaceAt(drawing, {4, 5})].is_meshed);
+}
+
+TEST(PlanarFacesTest, TheUnionOfGroupsEachByEvenAndOdd) {
+  Drawing drawing = Drawing().Group(7).Square(0, 9).Square(1, 8).Group(3).Square(2, 7).Square(3, 6).Square(4, 5);
+  drawing.rule = FaceRule::kUnion;
+  EXPECT_TRUE(drawing.Find()->faces[FaceAt(drawing, {0.5, 5})].is_meshed);
+  EXPECT_FALSE(drawing.Find()->faces[FaceAt(drawing, {1.5, 5})].is_meshed);
+  EXPECT_TRUE(drawing.Find()->faces[FaceAt(drawing, {2.5, 5})].is_meshed);
+  EXPECT_FALSE(drawing.Find()->faces[FaceAt(drawing, {3.5, 5})].is_meshed);
+  EXPECT_TRUE(drawing.Find()->faces[FaceAt(drawing, {4.5, 4.5})].is_meshed);
+  // A group that lies in another makes no hole, and one that fills the hole of another fills it.
+  drawing = Drawing().Group(1).Square(0, 9).Square(1, 8).Group(2).Square(1, 8).Group(3).Square(2, 3);
+  drawing.rule = FaceRule::kUnion;
+  EXPECT_EQ(MeshedCount(*drawing.Find()), 3u);
+}
+
+TEST(PlanarFacesTest, TheUnionWantsTheRingsOfEachGroupClosed) {
+  // Together they are closed.
+  Drawing drawing = Drawing().Group(4).Square(0, 1);
+  drawing.groups[2] = 5;
+  drawing.rule = FaceRule::kUnion;
+  EXPECT_THAT(drawing.Find().status().message(), AllOf(HasSubstr("faces: the rings of group 4 are not closed"),
+                                                       HasSubstr("points["), HasSubstr("an end of segments[")));
+  drawing.is_open.assign(4, 1);
+  drawing.Group(5).Square(2, 3);
+  EXPECT_EQ(MeshedCount(*drawing.Find()), 1u);
 }
 
 TEST(PlanarFacesTest, ALineInsideARingDoesNotChangeSides) {
@@ -315,6 +351,59 @@ TEST_F(PlanarFacesPropertyTest, EvenAndOddIsWhatARayCounts) {
   }
 }
 
+TEST_F(PlanarFacesPropertyTest, TheUnionHasWhatARayCountsInAnyGroup) {
+  for (int run = 0; run < 100; ++run) {
+    Drawing drawing;
+    drawing.rule = FaceRule::kUnion;
+    std::vector<Drawing> alone;
+    const size_t groups = 1 + random_.Below(5);
+    for (size_t i = 0; i < groups; ++i) {
+      alone.emplace_back();
+      drawing.Group(static_cast<uint32_t>(random_.Below(1000) * groups + i));
+      for (uint64_t ring = 0; ring < 1 + random_.Below(3); ++ring) {
+        std::vector<Point<2>> corners(3 + random_.Below(5));
+        for (Point<2>& corner : corners) {
+          corner = {static_cast<double>(random_.Below(9)), static_cast<double>(random_.Below(9))};
+        }
+        drawing.Ring(corners);
+        alone.back().Ring(corners);
+      }
+    }
+    const size_t first = drawing.points.size() / 2;
+    for (int i = 0; i < 20; ++i) {
+      drawing.points.insert(drawing.points.end(), {9 * random_.Unit(), 9 * random_.Unit()});
+    }
+    const auto faces = drawing.Find();
+    if (!faces.ok()) {  // all rings were flat
+      EXPECT_THAT(faces.status().message(), HasSubstr("face"));
+      continue;
+    }
+    for (size_t i = first; i < first + 20; ++i) {
+      bool is_inside = false;
+      for (const Drawing& group : alone) {
+        Features features;
+        features.ends = group.ends;
+        features.crossings = CrossingRule::kSplit;
+        const PlanarGraph graph = *MakePlanarGraph(group.points, features, nullptr, 1e-12, 1'000'000, 1, RunContext());
+        is_inside = is_inside || CrossingsLeftOf(graph, PointAt<2>(drawing.points, i)) % 2 == 1;
+      }
+      EXPECT_EQ(faces->IsMeshed(faces->point_face[drawing.graph.point_of_input[i]]), is_inside) << "run " << run;
+    }
+  }
+}
+
+TEST(PlanarFacesTest, SeedsThatMeanNothingAreCounted) {
+  Drawing drawing = Drawing().Square(0, 9).Square(1, 2);
+  drawing.seeds = {{.at = {1.5, 1.5}, .is_hole = true},
+                   {.at = {20, 0}, .is_hole = true},
+                   {.at = {5, 5}, .region = 3},
+                   {.at = {-1, 0}, .region = 4}};
+  const auto faces = drawing.Find();
+  ASSERT_TRUE(faces.ok()) << faces.status();
+  EXPECT_EQ(faces->unused_seeds, 2u);
+  EXPECT_EQ(faces->first_unused_seed, 1u);
+}
+
 TEST_F(PlanarFacesPropertyTest, APolygonHasWhatARayCountsInItsOwnRings) {
   for (int run = 0; run < 100; ++run) {
     Drawing drawing;
@@ -358,7 +447,7 @@ TEST_F(PlanarFacesPropertyTest, APolygonHasWhatARayCountsInItsOwnRings) {
         }
       }
       if (around.empty()) {
-        EXPECT_EQ(polygon, GraphSegment::kNoPolygon);
+        EXPECT_EQ(polygon, OddSets::kEmpty);
       } else {
         EXPECT_THAT(around, ::testing::Contains(polygon));
       }

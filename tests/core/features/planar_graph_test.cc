@@ -34,6 +34,7 @@ struct Input {
   std::vector<int32_t> markers{};
   CrossingRule crossings = CrossingRule::kRefuse;
   uint64_t max_vertices = 10'000'000;
+  double snap_distance = 0;
 
   absl::StatusOr<PlanarGraph> Make(const Box<2>* box = nullptr, int threads = 1,
                                    const RunContext& context = RunContext()) const {
@@ -41,6 +42,7 @@ struct Input {
     features.ends = ends;
     features.markers = markers;
     features.crossings = crossings;
+    features.snap_distance = snap_distance;
     return MakePlanarGraph(points, features, box, kSeparation, max_vertices, threads, context);
   }
 };
@@ -175,6 +177,56 @@ TEST(PlanarGraphTest, WhereSegmentsAreLedThroughPointsCrossingsAreRefusedAlone) 
   const auto graph = input.Make();
   ASSERT_TRUE(graph.ok()) << graph.status();
   EXPECT_EQ(graph->counts.near_vertices, 99u);
+}
+
+TEST(PlanarGraphTest, SegmentsAreLedThroughPointsWithinTheSnapDistance) {
+  Input input{.points = {0, 0, 2, 0, 1, 0.01, 1, 1, 0.5, 0.02}, .ends = {0, 1, 2, 3}};
+  input.snap_distance = 0.0149;  // not looked at where nothing is led
+  EXPECT_EQ(PairsOf(*input.Make()), (std::set<std::pair<uint32_t, uint32_t>>{{0, 1}, {2, 3}}));
+  for (const CrossingRule rule : {CrossingRule::kSnap, CrossingRule::kSplit}) {
+    input.crossings = rule;
+    const auto graph = input.Make();
+    ASSERT_TRUE(graph.ok()) << graph.status();
+    // That leads it near to the other point, and not as near as that: 0.015.
+    EXPECT_EQ(PairsOf(*graph), (std::set<std::pair<uint32_t, uint32_t>>{{0, 2}, {1, 2}, {2, 3}}));
+    EXPECT_EQ(graph->counts.near_vertices, 1u);
+    EXPECT_EQ(graph->points.size(), 5u);
+  }
+  input.snap_distance = 0.025;
+  EXPECT_EQ(PairsOf(*input.Make()), (std::set<std::pair<uint32_t, uint32_t>>{{0, 4}, {2, 4}, {1, 2}, {2, 3}}));
+}
+
+TEST(PlanarGraphTest, ACrossingBecomesAPointWithinTheSnapDistance) {
+  Input input{.points = {0, 0, 2, 0, 1, -1, 1, 1, 1.01, 0.005},
+              .ends = {0, 1, 2, 3},
+              .crossings = CrossingRule::kSplit,
+              .snap_distance = 0.02};
+  const auto graph = input.Make();
+  ASSERT_TRUE(graph.ok()) << graph.status();
+  EXPECT_EQ(PairsOf(*graph), (std::set<std::pair<uint32_t, uint32_t>>{{0, 4}, {1, 4}, {2, 4}, {3, 4}}));
+  EXPECT_EQ(graph->points.size(), 5u);
+}
+
+TEST(PlanarGraphTest, CornersThatDoublesCannotServeAreOne) {
+  // The triangles have a corner in common, but for its last bits.
+  const Input input{.points = {0, 0, 2, 0, 1, 1, 1, 1 + 1e-12, 2, 2, 0, 2},
+                    .ends = {0, 1, 1, 2, 2, 0, 3, 4, 4, 5, 5, 3}};
+  const auto graph = input.Make();
+  ASSERT_TRUE(graph.ok()) << graph.status();
+  EXPECT_EQ(graph->points.size(), 5u);
+  EXPECT_EQ(graph->point_of_input, (std::vector<uint32_t>{0, 1, 2, 2, 3, 4}));
+  EXPECT_EQ(graph->counts.merged_points, 1u);
+  EXPECT_EQ(graph->counts.equal_points, 0u);
+  EXPECT_EQ(graph->segments.size(), 6u);
+}
+
+TEST(PlanarGraphTest, AVertexOnASegmentStaysOnItWhereTwinsMoveThat) {
+  // The end of the segment moves to its twin, and the vertex on it is beside it by that.
+  const Input input{.points = {0, 0, 3, 3 + 1e-12, 1, 1, 1, 2, 3, 3, 4, 0}, .ends = {0, 1, 2, 3, 4, 5, 5, 4}};
+  const auto graph = input.Make();
+  ASSERT_TRUE(graph.ok()) << graph.status();
+  EXPECT_EQ(graph->counts.merged_points, 1u);
+  EXPECT_TRUE(PairsOf(*graph).contains({0, 2})) << "led through the vertex";
 }
 
 TEST(PlanarGraphTest, TheBoxBelongsToTheGraph) {
@@ -338,6 +390,24 @@ TEST_F(PlanarGraphPropertyTest, CrossingsAreTheSameInAnyOrder) {
     }
   }
   EXPECT_GT(crossings, 1000);
+}
+
+TEST_F(PlanarGraphPropertyTest, WhatIsSnappedIsTheSameInAnyOrder) {
+  uint64_t led = 0;
+  for (int run = 0; run < 100; ++run) {
+    Input input = CrossingSegments(random_);
+    input.snap_distance = 1e-3 * static_cast<double>(1 + random_.Below(20));
+    const auto graph = input.Make();
+    ASSERT_TRUE(graph.ok()) << graph.status();
+    led += graph->counts.near_vertices;
+    for (int other = 0; other < 4; ++other) {
+      const auto shuffled = Shuffled(input, random_).Make(nullptr, 1 + other % 2);
+      ASSERT_TRUE(shuffled.ok()) << shuffled.status();
+      ASSERT_EQ(PlacesOf(*shuffled), PlacesOf(*graph)) << "run " << run;
+      EXPECT_EQ(shuffled->counts.near_vertices, graph->counts.near_vertices);
+    }
+  }
+  EXPECT_GT(led, 100u);
 }
 
 TEST_F(PlanarGraphPropertyTest, SegmentsOnACommonLineShareWhatTheyHaveInCommon) {

@@ -253,7 +253,7 @@ class ValidateDomainPropertyTest : public test::SeededTest {
   DomainInput RandomDomain() {
     DomainInput input;
     input.crossings = CrossingRule::kSplit;
-    input.faces = std::vector{FaceRule::kBox, FaceRule::kHoles, FaceRule::kEvenOdd}[random_.Below(3)];
+    input.faces = std::vector{FaceRule::kBox, FaceRule::kHoles, FaceRule::kEvenOdd, FaceRule::kUnion}[random_.Below(4)];
     input.parameters.domain_low = {-1, -1};
     input.parameters.domain_high = {9, 9};
     if (input.faces != FaceRule::kBox) {
@@ -267,12 +267,14 @@ class ValidateDomainPropertyTest : public test::SeededTest {
       }
       const size_t first = input.ends.size() / 2;
       input.Ring(corners);
+      input.groups.resize(input.ends.size() / 2, static_cast<uint32_t>(7 + random_.Below(3)));
       if (random_.Below(2) == 0) {
         AddPolygon(input, first, 3);
       }
     }
-    for (uint64_t line = random_.Below(3); line > 0 && input.faces != FaceRule::kEvenOdd; --line) {
+    for (uint64_t line = random_.Below(3); line > 0 && input.faces <= FaceRule::kHoles; --line) {
       input.Segment(OnGrid(size), OnGrid(size));
+      input.groups.push_back(0);
     }
     for (uint64_t point = random_.Below(3); point > 0; --point) {
       const Point<2> p = OnGrid(size);
@@ -286,6 +288,34 @@ class ValidateDomainPropertyTest : public test::SeededTest {
     return input;
   }
 };
+
+TEST_F(ValidateDomainPropertyTest, MeshesOfMergedAndSnappedDomainsAgree) {
+  int agreed = 0;
+  uint64_t merged = 0;
+  uint64_t led = 0;
+  for (int run = 0; run < 300; ++run) {
+    SCOPED_TRACE(absl::StrCat("run ", run));
+    DomainInput input = RandomDomain();
+    for (double& x : input.points) {
+      x += 1e-4 * random_.Unit();
+    }
+    input.parameters.merge_distance = 1e-3;
+    input.snap_distance = 1e-3;
+    const absl::StatusOr<Mesh> made = input.Make();
+    if (!made.ok()) {
+      EXPECT_THAT(std::string(made.status().message()), ::testing::ContainsRegex("face|seeds"));
+      continue;
+    }
+    merged += made->statistics.merged_points;
+    led += made->statistics.domain->near_points;
+    const DomainMesh mesh(*made);
+    ASSERT_EQ(CheckAgainst(input, mesh), absl::OkStatus()) << TextOf(input);
+    ++agreed;
+  }
+  EXPECT_GE(agreed, 100);
+  EXPECT_GE(merged, 100u);
+  EXPECT_GE(led, 100u);
+}
 
 TEST_F(ValidateDomainPropertyTest, MeshesOfRandomDomainsAgreeAndThoseWithoutAFaceDoNot) {
   int agreed = 0;

@@ -331,12 +331,6 @@ TEST_F(SegmentsTest, ParametersThatADomainDoesNotHaveAreNamed) {
 
   v1::CreateSessionRequest create;
   create.mutable_parameters()->set_dimension(2);
-  create.mutable_parameters()->set_merge_distance(0.5);
-  const std::string merging = calls_.Create(create).name();
-  calls_.AddSegments({FrameRequest(merging)});
-  calls_.Start(merging, &status_);
-  ExpectError(grpc::StatusCode::INVALID_ARGUMENT, "INVALID_PARAMETERS", "parameters.merge_distance");
-
   *create.mutable_parameters() = UnitCubeParameters(2);
   const std::string boxed = calls_.Create(create).name();
   calls_.AddSegments({FrameRequest(boxed)});

@@ -49,7 +49,44 @@ TEST(FeatureStore, KeepsMarkersAndRingsOfSegmentsFromManyChunks) {
   EXPECT_THAT(features.is_open, ElementsAre(0, 0, 1, 1, 0));
   EXPECT_EQ(store.segment_count(), 5u);
   EXPECT_EQ(store.Summary().faces, v1::FACE_RULE_BOX);
-  EXPECT_EQ(store.bytes(), 5u * 13);
+  EXPECT_EQ(store.bytes(), 5u * 17);
+}
+
+TEST(FeatureStore, KeepsGroupsAndTheSnapDistance) {
+  FeatureStore store;
+  store.Append(Chunk({0, 1, 1, 2}));
+  const FeatureSummary before = store.Summary();
+  v1::SegmentChunk chunk = Chunk({2, 3, 3, 4, 4, 5});
+  for (const uint32_t group : {8, 9, 9}) {
+    chunk.add_groups(group);
+  }
+  store.Append(chunk, 1);
+  EXPECT_THAT(store.View()->groups, ElementsAre(0, 0, 9, 9));
+  EXPECT_EQ(store.CountEqual(2, 2, Chunk({3, 4, 4, 5})), 0u) << "of other groups";
+  chunk.mutable_ends()->erase(chunk.ends().begin(), chunk.ends().begin() + 2);
+  EXPECT_FALSE(CheckSegments(chunk, 0).ok());
+  EXPECT_EQ(DetailsOf(CheckSegments(chunk, 0)).field, "segments.groups");
+  chunk.mutable_groups()->erase(chunk.groups().begin());
+  EXPECT_EQ(store.CountEqual(2, 2, chunk), 2u);
+  v1::FaceOptions rules = Faces(v1::FACE_RULE_UNION);
+  rules.set_crossings(v1::CROSSING_RULE_SNAP);
+  rules.set_snap_distance(0.25);
+  EXPECT_TRUE(CheckFaces(rules, 0).ok());
+  store.Append(rules);
+  EXPECT_EQ(store.View()->snap_distance, 0.25);
+  EXPECT_EQ(store.View()->faces, core::FaceRule::kUnion);
+  EXPECT_EQ(store.Summary().faces, v1::FACE_RULE_UNION);
+  EXPECT_FALSE(store.HasOtherRules(rules));
+  rules.set_snap_distance(0.5);
+  EXPECT_TRUE(store.HasOtherRules(rules));
+  rules.set_crossings(v1::CROSSING_RULE_REFUSE);
+  EXPECT_EQ(DetailsOf(CheckFaces(rules, 0)).field, "faces.snap_distance");
+  rules.set_crossings(v1::CROSSING_RULE_SPLIT);
+  rules.set_snap_distance(-1);
+  EXPECT_EQ(DetailsOf(CheckFaces(rules, 0)).field, "faces.snap_distance");
+  store.TakeBack(before);
+  EXPECT_THAT(store.View()->groups, ElementsAre(0, 0));
+  EXPECT_EQ(store.View()->snap_distance, 0);
 }
 
 TEST(FeatureStore, WhatWasAppendedCanBeTakenBack) {

@@ -386,9 +386,6 @@ TEST(CloudReceiver, RefusesParametersThatADomainDoesNotHave) {
   EXPECT_EQ(DetailsOf(refusal(parameters, SegmentsRequest(2))).reason, "INVALID_PARAMETERS");
   EXPECT_EQ(DetailsOf(refusal(parameters, SegmentsRequest(2))).field, "parameters.criterion");
   parameters = InThePlane();
-  parameters.mutable_parameters()->set_merge_distance(1);
-  EXPECT_EQ(DetailsOf(refusal(parameters, SegmentsRequest(2))).field, "parameters.merge_distance");
-  parameters = InThePlane();
   parameters.mutable_parameters()->mutable_domain()->mutable_low()->Resize(2, 0);
   parameters.mutable_parameters()->mutable_domain()->mutable_high()->Resize(2, 1);
   EXPECT_TRUE(refusal(parameters, SegmentsRequest(2)).ok());

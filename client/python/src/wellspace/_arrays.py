@@ -21,13 +21,7 @@ def coordinates(values: Any, name: str, dimension: int | None = None) -> Floats:
     InvalidArgumentError
         Its field is `name`, or ``name[row]``.
     """
-    if isinstance(values, np.ma.MaskedArray):
-        mask = np.broadcast_to(np.asarray(values.mask), values.shape)
-        masked = np.flatnonzero(mask.reshape(len(values), -1).any(axis=1))
-        if len(masked):
-            raise _row_error(name, masked[0], "is masked; expected a number on every axis")
-        values = values.data
-    array = _numbers(values, name)
+    array = _numbers(_unmasked(values, name, "a number on every axis"), name)
     if array.ndim != 2:
         if array.size == 0 and array.ndim == 1 and dimension is not None:
             return np.empty((0, dimension))
@@ -43,12 +37,13 @@ def coordinates(values: Any, name: str, dimension: int | None = None) -> Floats:
     if not finite.all():
         row, axis = np.argwhere(~finite)[0]
         raise _row_error(name, row, f"coordinate {axis} is {result[row, axis]}; expected a finite number")
+    _check_kept(array, result, name)
     return result
 
 
 def row_of_numbers(values: Any, name: str, count: int | None = None) -> Floats:
     """`values` as (count,) finite doubles."""
-    array = _numbers(values, name)
+    array = _numbers(_unmasked(values, name, "a number"), name)
     if array.ndim != 1 or count not in (None, len(array)):
         expected = "numbers" if count is None else f"{count} numbers"
         raise InvalidArgumentError(f"{name}: an array of shape {array.shape}; expected {expected}", field=name)
@@ -56,6 +51,7 @@ def row_of_numbers(values: Any, name: str, count: int | None = None) -> Floats:
     if not np.isfinite(result).all():
         axis = np.flatnonzero(~np.isfinite(result))[0]
         raise _row_error(name, axis, f"is {result[axis]}; expected a finite number")
+    _check_kept(array, result, name)
     return result
 
 
@@ -140,6 +136,29 @@ def _numbers(values: Any, name: str) -> npt.NDArray[Any]:
             if not _is_like(value, values[0]):
                 raise _row_error(name, row, f"is {value!r}; expected as many numbers as in each row")
     raise InvalidArgumentError(f"{name}: an array of {array.dtype}; expected numbers", field=name)
+
+
+def _unmasked(values: Any, name: str, expected: str) -> Any:
+    """`values`, of which none may be masked."""
+    if not isinstance(values, np.ma.MaskedArray) or values.ndim == 0:
+        return values
+    mask = np.broadcast_to(np.asarray(values.mask), values.shape)
+    masked = np.flatnonzero(mask.reshape(len(values), -1).any(axis=1))
+    if len(masked):
+        raise _row_error(name, masked[0], f"is masked; expected {expected}")
+    return values.data
+
+
+def _check_kept(array: npt.NDArray[Any], result: Floats, name: str) -> None:
+    """Refuses whole numbers that no double is."""
+    if array.dtype.kind not in "iu" or array.dtype.itemsize < 8:
+        return
+    with np.errstate(invalid="ignore"):  # beyond the integers it is another number, too
+        rounded = np.argwhere(result.astype(array.dtype) != array)
+    if len(rounded):
+        row = tuple(rounded[0])
+        raise _row_error(name, row[0], f"has {array[row]}, which no double is; expected whole numbers up to 2**53, or "
+                                       "doubles")
 
 
 def _is_like(row: Any, first: Any) -> bool:

@@ -76,6 +76,8 @@ class Domain:
     regions: tuple[RegionSeed | RegionPolygon, ...]
     faces: int
     crossings: int
+    groups: npt.NDArray[np.uint32] | None  # (m,)
+    snap_distance: float | None
 
     def segment_chunks(self) -> Iterator[tuple[int, bytes]]:
         """Serialized SegmentChunks, and the number of the first segment of each."""
@@ -85,6 +87,8 @@ class Domain:
                 message = _api.message("SegmentChunk")(open=is_open)
                 if self.markers is not None:
                     message.markers.extend(self.markers[first:last].tolist())
+                if self.groups is not None:
+                    message.groups.extend(self.groups[first:last].tolist())
                 yield first, _wire.packed_field(1, self.ends[first:last]) + message.SerializeToString()
 
     def face_options(self, segments_before: int = 0) -> Iterator[tuple[int, bytes]]:
@@ -100,6 +104,8 @@ class Domain:
                 seeds[-1].polygon.first, seeds[-1].polygon.count = segments_before + r.first, r.count
         for first in range(0, max(1, len(seeds)), _SEEDS_OF_A_REQUEST):
             options = _api.message("FaceOptions")(faces=self.faces, crossings=self.crossings)
+            if self.snap_distance is not None:
+                options.snap_distance = self.snap_distance
             options.seeds.extend(seeds[first : first + _SEEDS_OF_A_REQUEST])
             yield first, options.SerializeToString()
 
@@ -111,19 +117,26 @@ class DomainArguments(TypedDict, total=False):
     markers : (m,) int
         A marker for each segment, which tells parts of the boundary apart: see `Mesh.facet_names`. Default: 0.
     open_segments : (k, 2) int
-        Segments that are part of no ring: `faces` "even-odd" passes over them.
+        Segments that are part of no ring: `faces` "even-odd" and "union" pass over them.
     open_markers : (k,) int
         Their markers.
     holes : (h, 2) float
         Points in faces that are not meshed.
     regions : sequence of RegionSeed, RegionPolygon, or (x, y, region, max_area)
         Points in faces that are a region of their own, or that have a largest area of triangles; or polygons of them.
-    faces : {"box", "holes", "even-odd"}
+    faces : {"box", "holes", "even-odd", "union"}
         Which faces, into which segments cut the plane, are meshed: all in the box; all bounded ones; those that an odd
-        number of segments separates from infinity. Faces with a hole never are. Default "holes", with `box` "box".
+        number of segments separates from infinity; those of which that is so for the segments of at least one group.
+        Faces with a hole never are. Default "holes", with `box` "box".
+    groups : (m,) int
+        For `faces` "union": a number for each of `segments`, from 0 to 2**32 - 1, the same for those of one group, as a
+        feature of a map. Default: all are of one.
     crossings : {"refuse", "snap", "split"}
         What becomes of segments that cross, and of points too near to a segment. "refuse", the default: an error.
         "snap": segments are led through such points. "split": also, and crossings become vertices.
+    snap_distance : float
+        With `crossings` "snap" and "split": segments are led through points nearer than this, too. In the unit of the
+        points. Default: what doubles cannot serve.
     """
 
     segments: Any
@@ -134,6 +147,8 @@ class DomainArguments(TypedDict, total=False):
     regions: Any
     faces: str
     crossings: str
+    groups: Any
+    snap_distance: float
 
 
 def make_domain(given: Mapping[str, Any], point_count: int | None = None, has_box: bool = False) -> Domain:
@@ -155,7 +170,40 @@ def make_domain(given: Mapping[str, Any], point_count: int | None = None, has_bo
         regions=tuple(_seed(one, f"regions[{row}]", len(closed)) for row, one in enumerate(given.get("regions", ()))),
         faces=choice(rule, "faces", _FACES),
         crossings=choice(given.get("crossings", "refuse"), "crossings", _CROSSINGS),
+        groups=_groups(given.get("groups"), len(closed), len(opened)),
+        snap_distance=_snap_distance(given),
     )
+
+
+def _groups(given: Any, closed: int, opened: int) -> npt.NDArray[np.uint32] | None:
+    """A group for each segment; open ones, which are of none, come last."""
+    if given is None:
+        return None
+    numbers = np.asarray(given)
+    if numbers.shape != (closed,) or not (np.issubdtype(numbers.dtype, np.integer) or numbers.size == 0):
+        raise InvalidArgumentError(
+            f"groups has shape {numbers.shape} and type {numbers.dtype}; expected {closed} whole numbers, one for each "
+            "of segments",
+            field="groups",
+        )
+    outside = np.flatnonzero((numbers < 0) | (numbers >= 2**32))
+    if outside.size:
+        raise InvalidArgumentError(
+            f"groups[{outside[0]}] is {numbers[outside[0]]}; expected a whole number from 0 to {2**32 - 1}",
+            field="groups",
+        )
+    return np.concatenate([numbers.astype(np.uint32), np.zeros(opened, np.uint32)])
+
+
+def _snap_distance(given: Mapping[str, Any]) -> float | None:
+    if given.get("snap_distance") is None:
+        return None
+    distance = number(given["snap_distance"], "snap_distance")
+    if not 0 <= distance < math.inf:
+        raise InvalidArgumentError(
+            f"snap_distance is {distance}; expected a finite number of at least 0", field="snap_distance"
+        )
+    return distance
 
 
 def _whole(value: Any, name: str, what: str, low: int, high: int) -> int:

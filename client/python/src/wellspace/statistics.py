@@ -87,6 +87,8 @@ class DomainStatistics:
     near_points: int
     exempt_simplices: int
     min_input_angle_deg: float
+    unused_seeds: int
+    first_unused_seed: int
 
 
 @dataclasses.dataclass(frozen=True)
