@@ -10,6 +10,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "client/cli/length.h"
 #include "client/formats/cloud.h"
 #include "client/formats/domain/planar_domain.h"
 #include "client/formats/domain/read_planar_domain.h"
@@ -17,6 +18,9 @@
 #include "client/types.h"
 
 namespace wellspace::cli {
+
+// May stand without its value: RunCommandLine gives it one.
+inline constexpr char kSnapOption[] = "--snap";
 
 // A domain in the plane: --segments, --faces, --split-crossings, --snap, --region-property and --marker-property.
 //
@@ -28,6 +32,9 @@ class DomainOptions {
   // The same but for --split-crossings and --snap. `what` is the file, as the options say it.
   void AddReadingTo(CLI::App& command, const std::string& what);
 
+  // --snap alone.
+  void AddSnapTo(CLI::App& command, const std::string& description);
+
   // Whether `path`, or the format that is given, has segments.
   bool IsDomain(const std::string& path, const std::string& format) const;
 
@@ -37,7 +44,7 @@ class DomainOptions {
   // Reads the domain, by the format and the columns that are given; its points alone are returned, with their origins,
   // and its segments are kept.
   //
-  // Errors:     those of formats::ReadPlanarDomain; INVALID_ARGUMENT for attributes that are no region.
+  // Errors:     those of formats::ReadPlanarDomain.
   absl::StatusOr<formats::PointCloud> Read(const std::string& path, const formats::CloudOptions& options);
 
   // Whether what has been read tells the markers of segments, and the regions of faces: GeoJSON does by a property.
@@ -56,13 +63,17 @@ class DomainOptions {
   };
   // `status`, with the places in the file of the points, segments and seeds that it names.
   absl::Status WithOrigins(const absl::Status& status, const Before& before) const;
+  // What a mesh of the domain tells of its seeds, a sentence each: those that mean nothing.
+  //
+  // REQUIRES:   Read is OK.
+  std::vector<std::string> NotesOf(const std::optional<client::DomainStatistics>& statistics) const;
   absl::Status WithOrigins(const absl::Status& status) const { return WithOrigins(status, Before()); }
 
  private:
   bool has_segments_ = false;
   std::string faces_;
   bool splits_crossings_ = false;
-  bool snaps_ = false;
+  std::optional<Length> snap_;
   formats::DomainOptions reading_;
   std::optional<formats::PlanarDomain> domain_;
   std::shared_ptr<const client::Features> features_;

@@ -85,9 +85,10 @@ absl::StatusOr<formats::PointCloud> MeshingOptions::Read() {
 }
 
 absl::StatusOr<client::MeshOptions> MeshingOptions::OptionsFor(const formats::PointCloud& cloud) {
-  WELLSPACE_ASSIGN_OR_RETURN(client::MeshOptions options, parameters_.For(cloud.dimension));
+  WELLSPACE_ASSIGN_OR_RETURN(client::MeshOptions options, parameters_.For(cloud.dimension, cloud.points));
   options.features = domain_.features();
-  WELLSPACE_ASSIGN_OR_RETURN(options.size_samples, size_field_.Read(cloud.dimension));
+  WELLSPACE_ASSIGN_OR_RETURN(options.size_samples,
+                             size_field_.Read(cloud.dimension));
   if (!options.threads.has_value()) {
     options.threads = HelpfulThreads(options, cloud.points);
   }

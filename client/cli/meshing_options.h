@@ -61,6 +61,11 @@ class MeshingOptions {
   // Reads the cloud, or the domain, opens the server and does `work`. Returns the exit code, errors reported.
   int Run(const Work& work);
 
+  // What a mesh of the domain tells of its seeds; nothing of a cloud.
+  std::vector<std::string> NotesOf(const std::optional<client::DomainStatistics>& statistics) const {
+    return domain_.features() == nullptr ? std::vector<std::string>() : domain_.NotesOf(statistics);
+  }
+
   // Writes `statistics`, an object in JSON, with what was noted of the cloud, to where --stats and --output ask for it,
   // if they do.
   // With the notes of the cloud, and those of a file that was written.

@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "client/cli/length.h"
 #include "client/cli/options.h"
 #include "client/cli/size_field_options.h"
 #include "client/error_details.h"
@@ -79,8 +80,10 @@ void ParameterOptions::AddSpaceTo(CLI::App& command) {
   AddNumber(command, "--margin", options_.margin,
             "Grow the bounding box of the points on every side by this times its longest side; default: 0.25")
       ->excludes(domain);
-  AddNumber(command, "--merge", options_.merge_distance,
-            "Points no farther than this from another one become that one's vertex; default: equal ones only");
+  AddLength(command, "--merge", merge_,
+            "Points no farther than this from another one become that one's vertex, and ends of segments with them: a "
+            "length, or a share of the longest side of the points' bounding box, as 0.01%; default: equal ones, and "
+            "corners of polygons that doubles cannot tell apart");
 }
 
 void ParameterOptions::AddQualityTo(CLI::App& command) {
@@ -142,11 +145,18 @@ absl::Status ParameterOptions::Check() const {
   return SizeBoxesOf(size_boxes_, IsDimension(dimension()) ? dimension() : 0).status();
 }
 
-absl::StatusOr<client::MeshOptions> ParameterOptions::For(int dimension) const {
+absl::StatusOr<client::MeshOptions> ParameterOptions::For(int dimension, std::span<const double> points) const {
   WELLSPACE_ASSIGN_OR_RETURN(std::vector<client::SizeBox> boxes, SizeBoxesOf(size_boxes_, dimension));
   client::MeshOptions options = options_;
   options.dimension = dimension;
   options.size_boxes = std::move(boxes);
+  if (merge_.has_value()) {
+    if (merge_->is_share && points.empty()) {
+      return absl::InvalidArgumentError(
+          "--merge: a share is one of the points, which are not known yet; give a length");
+    }
+    options.merge_distance = merge_->Of(points, dimension);
+  }
   if (min_angle_ > 0) {
     if (dimension != 2) {
       return absl::InvalidArgumentError(

@@ -4,11 +4,13 @@
 
 #include <CLI/CLI.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "client/cli/length.h"
 #include "client/types.h"
 
 namespace wellspace::cli {
@@ -37,8 +39,8 @@ class ParameterOptions {
   // What can be known to be wrong before the dimension is.
   absl::Status Check() const;
 
-  // What they say of a mesh of `dimension`.
-  absl::StatusOr<client::MeshOptions> For(int dimension) const;
+  // What they say of a mesh of `dimension`, of `points` if they are known.
+  absl::StatusOr<client::MeshOptions> For(int dimension, std::span<const double> points = {}) const;
 
   // Whether any of AddQualityTo's was given; if so, `parameters` with these in the place of its own.
   bool has_quality() const;
@@ -55,6 +57,7 @@ class ParameterOptions {
   std::vector<double> domain_;
   std::vector<std::vector<double>> size_boxes_;
   client::MeshOptions options_;
+  std::optional<Length> merge_;
   double min_angle_ = 0;               // degrees; 0: not given
   std::vector<CLI::Option*> quality_;  // in the order of AddQualityTo
 };

@@ -37,7 +37,8 @@ nlohmann::ordered_json DomainJson(const client::DomainStatistics& domain) {
           {"crossings", domain.crossings},
           {"near_points", domain.near_points},
           {"exempt_simplices", domain.exempt_simplices},
-          {"min_input_angle_deg", domain.min_input_angle_deg}};
+          {"min_input_angle_deg", domain.min_input_angle_deg},
+          {"unused_seeds", domain.unused_seeds}};
 }
 
 // What was changed of a domain, and what is not meshed of it.
@@ -53,6 +54,7 @@ std::string DomainText(const client::DomainStatistics& domain) {
   add(domain.near_points, "points that segments were led through");
   add(domain.dropped_segments, "segments dropped");
   add(domain.unmeshed_points, "points outside");
+  add(domain.unused_seeds, "holes and regions outside");
   return text;
 }
 

@@ -6,6 +6,8 @@
 #include "absl/strings/str_join.h"
 #include "client/cli/closest_word.h"
 #include "client/cli/command_tree.h"
+#include "client/cli/domain_options.h"
+#include "client/cli/length.h"
 #include "client/cli/standard_output.h"
 
 namespace wellspace::cli {
@@ -98,6 +100,12 @@ absl::Status UsageError(const CLI::App& app, const CLI::ParseError& error, const
 }  // namespace
 
 int RunCommandLine(CLI::App& app, std::vector<std::string> arguments, const int& exit_code) {
+  for (size_t i = 0; i < arguments.size(); ++i) {
+    const bool has_value = i + 1 < arguments.size() && Length::Parse(arguments[i + 1]).ok();
+    if (arguments[i] == kSnapOption && !has_value) {
+      arguments[i] = absl::StrCat(kSnapOption, "=0");
+    }
+  }
   StandardOutput output;
   try {
     std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());

@@ -71,6 +71,8 @@ void RequireDomain(const PlanarDomain& domain) {
           "every point has a marker, or none");
   Require(domain.is_line.empty() || domain.is_line.size() == domain.segment_count(),
           "every segment is of a line or not");
+  Require(domain.groups.empty() || domain.groups.size() == domain.segment_count(),
+          "every segment has a group, or none");
   bool has_region = false;
   for (const PlanarDomain::Seed& seed : domain.seeds) {
     Require(std::isfinite(seed.x) && std::isfinite(seed.y) && std::isfinite(seed.attribute), "seeds are finite");

@@ -149,7 +149,7 @@ struct CheckCommand {
   std::string cloud_path;
   DomainOptions domain_options;
   std::vector<double> domain_box;
-  double merge_distance = 0;
+  std::optional<Length> merge;
   formats::CloudOptions cloud_options;
   double rho = 0;
   client::Criterion criterion = client::Criterion::kRadiusEdge;
@@ -165,11 +165,15 @@ struct CheckCommand {
   absl::Status CheckFiles() const;
   // The points of --cloud, none without it; `report` says how they were read.
   absl::StatusOr<std::vector<double>> ReadCloudOf(int dimension, CloudReport& report);
+  // Of --merge, about `cloud`; 0 without it.
+  double MergeDistance(std::span<const double> cloud, int dimension) const {
+    return merge.has_value() ? merge->Of(cloud, dimension) : 0;
+  }
   bool IsCloudADomain() const {
     return !cloud_path.empty() && domain_options.IsDomain(cloud_path, cloud_options.format);
   }
   // What the mesh has to meet. REQUIRES: `sizes` and `cloud` outlive the result.
-  core::ValidationOptions ValidationFor(const WantedSizes& sizes, std::span<const double> cloud) const;
+  core::ValidationOptions ValidationFor(const WantedSizes& sizes, std::span<const double> cloud, int dimension) const;
   // Refuses what is asked of a box, and not of a domain with segments.
   absl::Status CheckOptionsOfDomain() const;
   // Holds the mesh of a domain to what that has to be, and to the domain of --cloud, whose points are `points`.
@@ -189,7 +193,8 @@ absl::StatusOr<WantedSizes> CheckCommand::Sizes(int dimension) {
   for (client::SizeBox& box : read) {
     sizes.boxes.push_back({std::move(box.low), std::move(box.high), box.max_circumradius});
   }
-  WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<const client::SizeSamples> samples, size_field.Read(dimension));
+  WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<const client::SizeSamples> samples,
+                             size_field.Read(dimension));
   if (samples != nullptr) {
     sizes.samples = {samples->points, samples->sizes,
                      samples->measure == client::SizeMeasure::kEdgeLength ? core::SizeMeasure::kEdgeLength
@@ -273,9 +278,12 @@ absl::Status CheckCommand::ValidateDomain(const formats::Mesh& mesh, const core:
   domain.features.markers = given.markers;
   domain.features.is_open = given.is_open;
   domain.features.seeds = seeds;
+  domain.features.groups = given.groups;
   domain.features.faces = given.faces == client::FaceRule::kHoles     ? core::FaceRule::kHoles
                           : given.faces == client::FaceRule::kEvenOdd ? core::FaceRule::kEvenOdd
+                          : given.faces == client::FaceRule::kUnion   ? core::FaceRule::kUnion
                                                                       : core::FaceRule::kBox;
+  domain.merge_distance = MergeDistance(points, 2);
   domain.has_markers = domain_options.KnowsMarkers();
   domain.has_regions = domain_options.KnowsRegions();
   if (!domain_box.empty()) {
@@ -290,7 +298,9 @@ absl::Status CheckCommand::ValidateDomain(const formats::Mesh& mesh, const core:
   for (const double x : points) {
     size = std::max(size, std::abs(x));
   }
-  return domain_options.WithOrigins(core::ValidateConformity(view, parts, domain, kBentBy * size, context));
+  // A segment that is led through a point may come near to another one by that.
+  const double tolerance = std::max(kBentBy * size, 2 * given.snap_distance.value_or(0));
+  return domain_options.WithOrigins(core::ValidateConformity(view, parts, domain, tolerance, context));
 }
 
 absl::Status CheckCommand::CheckFiles() const {
@@ -319,7 +329,8 @@ absl::StatusOr<std::vector<double>> CheckCommand::ReadCloudOf(int dimension, Clo
   return std::move(read.points);
 }
 
-core::ValidationOptions CheckCommand::ValidationFor(const WantedSizes& sizes, std::span<const double> cloud) const {
+core::ValidationOptions CheckCommand::ValidationFor(const WantedSizes& sizes, std::span<const double> cloud,
+                                                    int dimension) const {
   const bool is_well_spaced = criterion == client::Criterion::kWellSpaced;
   return {.rho = rho,
           .criterion = is_well_spaced ? core::Criterion::kWellSpaced : core::Criterion::kRadiusEdge,
@@ -328,16 +339,13 @@ core::ValidationOptions CheckCommand::ValidationFor(const WantedSizes& sizes, st
           .size_samples = &sizes.samples,
           .gradation = gradation.value_or(0),
           .cloud = cloud,
-          .merge_distance = merge_distance,
+          .merge_distance = MergeDistance(cloud, dimension),
           .min_angle_deg = min_dihedral};
 }
 
 absl::Status CheckCommand::CheckOptionsOfDomain() const {
   if (criterion == client::Criterion::kWellSpaced) {
     return absl::InvalidArgumentError("--criterion well-spaced: a domain with segments has the radius-edge one alone");
-  }
-  if (merge_distance != 0) {
-    return absl::InvalidArgumentError("--merge: points of a domain with segments are not merged; leave it out");
   }
   if (!cloud_path.empty() && !IsCloudADomain()) {
     return absl::InvalidArgumentError(absl::StrCat(
@@ -356,7 +364,7 @@ absl::Status CheckCommand::Validate(const formats::Mesh& mesh, const core::MeshV
   if (HasSegments(mesh) || IsCloudADomain()) {
     WELLSPACE_RETURN_IF_ERROR(CheckOptionsOfDomain());
     WELLSPACE_RETURN_IF_ERROR(ValidateDomain(mesh, view, cloud));
-    const core::ValidationOptions options = ValidationFor(sizes, cloud);
+    const core::ValidationOptions options = ValidationFor(sizes, cloud, mesh.dimension);
     WELLSPACE_RETURN_IF_ERROR(core::ValidateSizing(
         view, {options.max_circumradius, options.size_boxes, options.size_samples, options.gradation}));
     const double least = core::MeasureQuality(view).min_angle_deg;
@@ -365,7 +373,7 @@ absl::Status CheckCommand::Validate(const formats::Mesh& mesh, const core::MeshV
                : absl::FailedPreconditionError(
                      absl::StrFormat("the smallest angle is %.6g\u00b0, less than %.6g", least, options.min_angle_deg));
   }
-  const absl::Status status = core::ValidateMesh(view, ValidationFor(sizes, cloud));
+  const absl::Status status = core::ValidateMesh(view, ValidationFor(sizes, cloud, mesh.dimension));
   if (!status.ok() || mesh.boundary.empty()) {
     return status;
   }
@@ -463,11 +471,14 @@ void AddCheckCommand(CLI::App& app, int& exit_code) {
           "File of points that must be the first vertices, to the bit; or a domain, such as a .poly or .geojson or "
           "with --segments, that the mesh must be of, with its faces, regions, largest areas and tags")
       ->type_name("FILE");
-  AddNumber(*check, "--merge", command->merge_distance,
-            "Points of --cloud no farther than this from a vertex that is one of them need not be vertices")
+  AddLength(*check, "--merge", command->merge,
+            "Points of --cloud no farther than this from a vertex that is one of them need not be vertices; as mesh "
+            "takes it")
       ->needs("--cloud");
   AddCloudOptions(*check, command->cloud_options, "the cloud", formats::DomainOnlyFormats());
   command->domain_options.AddReadingTo(*check, "The cloud");
+  command->domain_options.AddSnapTo(*check,
+                                    "Segments may be as far from their places as mesh --snap LENGTH leads them");
   AddNumbers(*check, "--domain", command->domain_box,
              "Box that lines are in, low corner then high corner; default: that of the mesh")
       ->needs("--cloud");

@@ -2,6 +2,7 @@
 #include <iostream>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "client/cli/commands/commands.h"
@@ -70,8 +71,10 @@ absl::Status MeshCommand::Mesh(client::Client& client, const client::MeshOptions
       return status;
     }
   }
-  WELLSPACE_RETURN_IF_ERROR(options.WriteStatistics(StatisticsJson(file.header(), file.input_vertex()), file.notes()));
-  PrintNotes({.notes = file.notes()}, options.remote().format(), options.remote().quiet());
+  std::vector<std::string> notes = options.NotesOf(file.header().statistics.domain);
+  notes.insert(notes.end(), file.notes().begin(), file.notes().end());
+  WELLSPACE_RETURN_IF_ERROR(options.WriteStatistics(StatisticsJson(file.header(), file.input_vertex()), notes));
+  PrintNotes({.notes = notes}, options.remote().format(), options.remote().quiet());
   if (!options.remote().quiet()) {
     std::cerr << Summary(file.header()) << (output == formats::kStandardStream ? "" : " -> " + output) << "\n";
   }

@@ -64,6 +64,9 @@ absl::StatusOr<client::Features> Shifted(client::Features features, uint64_t fir
   for (client::FaceSeed& seed : features.seeds) {
     seed.first_segment += segments;
   }
+  for (uint32_t& group : features.groups) {
+    group += static_cast<uint32_t>(segments);  // those of another file are others
+  }
   return features;
 }
 

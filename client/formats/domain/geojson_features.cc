@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -41,6 +42,8 @@ void GeoJsonFeatures::End(const GeoJsonLevel& feature) {
     domain_.markers.resize(feature.first_segment);
     domain_.markers.resize(segments, *feature.marker);
   }
+  domain_.groups.resize(feature.first_segment);
+  domain_.groups.resize(segments, static_cast<uint32_t>(feature.first_segment));
   without_marker_ += !feature.marker && segments > feature.first_segment ? 1 : 0;
   AddRegions(feature);
 }
@@ -133,6 +136,9 @@ void GeoJsonFeatures::Finish() {
   };
   if (!has(0) || !has(1)) {
     domain_.is_line.clear();
+  }
+  if (std::adjacent_find(domain_.groups.begin(), domain_.groups.end(), std::not_equal_to<>()) == domain_.groups.end()) {
+    domain_.groups.clear();  // one feature, or none
   }
   domain_.segment_lines = {};  // places say where segments are
   NoteFeatures();

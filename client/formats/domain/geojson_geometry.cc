@@ -128,7 +128,8 @@ absl::Status GeoJsonGeometry::Error(const PlanarDomain& domain, const GeoJsonPla
 }
 
 absl::Status GeoJsonGeometry::AddPart(GeometryType type, std::span<const double> positions, const GeoJsonPlace& place,
-                                      PlanarDomain& domain) const {
+                                      PlanarDomain& domain, bool& is_flat) const {
+  is_flat = false;
   if (type == GeometryType::kPoint || type == GeometryType::kMultiPoint) {
     if (positions.size() / 2 > kMaxCount - domain.point_count()) {
       return Error(domain, place, absl::StrCat("expected at most ", kMaxCount, " points, got more"));
@@ -140,18 +141,16 @@ absl::Status GeoJsonGeometry::AddPart(GeometryType type, std::span<const double>
     return absl::OkStatus();
   }
   const bool is_ring = HasRings(type);
-  const int least = is_ring ? 3 : 2;
-  if (const int different = CountDifferent(positions); different < least) {
-    return Error(domain, place,
-                 absl::StrCat("expected a ", is_ring ? "ring" : "line", " of at least ", least,
-                              " different points, got ", different));
+  if (is_ring ? IsFlat(positions) : CountDifferent(positions) < 2) {
+    is_flat = true;
+    return absl::OkStatus();
   }
   if (const absl::Status status = AddPolyline(positions, nullptr, is_ring, domain); !status.ok()) {
     return Error(domain, place, std::string(status.message()));
   }
   domain.is_line.resize(domain.segment_count(), is_ring ? 0 : 1);
   if (is_ring) {
-    domain.faces = PlanarDomain::FaceRule::kEvenOdd;
+    domain.faces = PlanarDomain::FaceRule::kUnion;
   }
   return absl::OkStatus();
 }
@@ -172,6 +171,7 @@ absl::Status GeoJsonGeometry::MoveTo(GeometryType type, const GeoJsonPlace& geom
   uint64_t first = 0;
   uint32_t part = 0;
   uint32_t ring = 0;
+  bool is_outer_flat = false;  // the outer ring of the polygon
   for (const Closed& closed : closed_) {
     place = PlaceOfPart(type, geometry, part, ring);
     place.line = closed.line;
@@ -182,8 +182,21 @@ absl::Status GeoJsonGeometry::MoveTo(GeometryType type, const GeoJsonPlace& geom
       place.first_point = domain.point_count();
       place.first_segment = domain.segment_count();
       const std::span<const double> all = positions_;
-      WELLSPACE_RETURN_IF_ERROR(AddPart(type, all.subspan(2 * first, 2 * (closed.positions - first)), place, domain));
-      domain.places.push_back(place);
+      const std::span<const double> own = all.subspan(2 * first, 2 * (closed.positions - first));
+      bool is_flat = true;
+      is_outer_flat = is_outer_flat && ring > 0;
+      if (!is_outer_flat) {  // the holes of nothing are nothing
+        WELLSPACE_RETURN_IF_ERROR(AddPart(type, own, place, domain, is_flat));
+      }
+      if (is_flat) {
+        is_outer_flat = is_outer_flat || (HasRings(type) && ring == 0);
+        ++(HasRings(type) ? domain.flat_rings : domain.flat_lines);
+        domain.first_flat = domain.first_flat.empty()
+                                ? absl::StrCat(PathOf(place, domain.collections), " in line ", place.line)
+                                : domain.first_flat;
+      } else {
+        domain.places.push_back(place);
+      }
       first = closed.positions;
       (HasRings(type) ? ring : part) += 1;
     } else if (closed.depth == 2 && type == GeometryType::kMultiPolygon) {

@@ -49,8 +49,9 @@ class GeoJsonGeometry {
     uint64_t positions = 0;  // how many there were at its end
   };
 
+  // `is_flat` tells of a ring that encloses nothing, or of a line without length, which are not added.
   absl::Status AddPart(GeometryType type, std::span<const double> positions, const GeoJsonPlace& place,
-                       PlanarDomain& domain) const;
+                       PlanarDomain& domain, bool& is_flat) const;
   // An INVALID_ARGUMENT at a place.
   static absl::Status Error(const PlanarDomain& domain, const GeoJsonPlace& place, std::string_view message);
 

@@ -29,8 +29,9 @@ struct GeoJsonPlace {
 //
 // Thread safety: thread-compatible.
 struct PlanarDomain {
-  // Which faces count: the whole box; all bounded faces without a hole; those that an odd number of rings surround.
-  enum class FaceRule { kBox, kHoles, kEvenOdd };
+  // Which faces count: the whole box; all bounded faces without a hole; those that an odd number of rings surround;
+  // those that an odd number of rings of some group surround.
+  enum class FaceRule { kBox, kHoles, kEvenOdd, kUnion };
 
   // What stands for faces: a point for the one that it is in, or a polygon for all inside of it.
   struct Seed {
@@ -51,16 +52,23 @@ struct PlanarDomain {
   std::vector<int32_t> point_markers;  // of each point, or empty if the file has none
   std::vector<uint32_t> segments;      // segment_count() x 2, indices of points
   std::vector<int32_t> markers;        // of each segment; 0 where the file has none
-  // Of each segment 1 if it belongs to a line beside polygons, which does not turn inside to outside under kEvenOdd; or
-  // empty if there are no such lines.
+  // Of each segment 1 if it belongs to a line beside polygons, which does not turn inside to outside under kEvenOdd and
+  // kUnion; or empty if there are no such lines.
   std::vector<uint8_t> is_line;
+  // Of each segment its group, of GeoJSON the first segment of its feature; or empty if all are of one.
+  std::vector<uint32_t> groups;
   std::vector<Seed> seeds;          // holes first, then regions; of GeoJSON polygons
-  FaceRule faces = FaceRule::kBox;  // what the format means: of .poly HOLES, of polygons EVEN_ODD, of lines alone BOX
+  FaceRule faces = FaceRule::kBox;  // what the format means: of .poly HOLES, of polygons UNION, of lines alone BOX
 
   // What was changed, or is not used.
   uint64_t repeated_points = 0;  // dropped: equal to the one before in a ring or a line
   uint64_t unclosed_rings = 0;   // closed, though their first point is not repeated as the last
   uint64_t altitudes = 0;        // positions of GeoJSON with more than two numbers
+  uint64_t flat_rings = 0;  // of GeoJSON, left out: they enclose nothing, or are of a polygon whose outer ring is so
+  uint64_t flat_lines = 0;  // of GeoJSON, left out: of fewer than two different positions
+  std::string first_flat;   // where the first of both is
+  uint64_t rounded_numbers = 0;  // coordinates of GeoJSON that are whole numbers above 2^53, and no doubles
+  std::string first_rounded;     // the first of them, and where it is
   // What a user would want to know of how the file was read, a sentence each.
   std::vector<std::string> notes;
 

@@ -1,13 +1,61 @@
 #include "client/formats/domain/polyline.h"
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+#include <vector>
+
 #include "absl/strings/str_cat.h"
 #include "client/formats/io/number.h"
+#include "client/formats/orientation.h"
 
 namespace wellspace::formats {
 namespace {
 
 bool AreEqual(std::span<const double> positions, size_t a, size_t b) {
   return positions[2 * a] == positions[2 * b] && positions[2 * a + 1] == positions[2 * b + 1];
+}
+
+bool AreOnALine(std::span<const double> positions) {
+  size_t second = 1;
+  while (AreEqual(positions, 0, second)) {
+    ++second;
+  }
+  for (size_t i = second + 1; i < positions.size() / 2; ++i) {
+    const std::array<double, 6> corners = {positions[0],          positions[1],
+                                           positions[2 * second], positions[2 * second + 1],
+                                           positions[2 * i],      positions[2 * i + 1]};
+    if (OrientationSign(corners) != 0) {
+      return false;
+    }
+  }
+  return true;
+}
+
+// Whether a path there and back is all of a ring.
+bool AreEdgesEven(std::span<const double> positions) {
+  using Position = std::array<double, 2>;
+  std::vector<std::pair<Position, Position>> edges;
+  const size_t count = positions.size() / 2;
+  for (size_t i = 0; i < count; ++i) {
+    const size_t j = i + 1 == count ? 0 : i + 1;
+    const Position from = {positions[2 * i], positions[2 * i + 1]};
+    const Position to = {positions[2 * j], positions[2 * j + 1]};
+    if (from != to) {
+      edges.emplace_back(std::min(from, to), std::max(from, to));
+    }
+  }
+  std::sort(edges.begin(), edges.end());
+  for (size_t begin = 0, end = 0; begin < edges.size(); begin = end) {
+    while (end < edges.size() && edges[end] == edges[begin]) {
+      ++end;
+    }
+    if ((end - begin) % 2 != 0) {
+      return false;
+    }
+  }
+  return true;
 }
 
 }  // namespace
@@ -24,6 +72,28 @@ int CountDifferent(std::span<const double> positions) {
     }
   }
   return second < count ? 2 : static_cast<int>(second > 0);
+}
+
+bool IsFlat(std::span<const double> positions) {
+  if (CountDifferent(positions) < 3) {
+    return true;
+  }
+  const size_t count = positions.size() / 2;
+  const auto next = [&](size_t i) { return i + 1 == count ? 0 : i + 1; };
+  double sum = 0;
+  double magnitude = 0;
+  for (size_t i = 0; i < count; ++i) {
+    const size_t j = next(i);
+    const double term = (positions[2 * i] - positions[0]) * (positions[2 * j + 1] - positions[1]) -
+                        (positions[2 * i + 1] - positions[1]) * (positions[2 * j] - positions[0]);
+    sum += term;
+    magnitude += std::abs(term);
+  }
+  constexpr double kSurelyNotFlat = 1e-6;
+  if (std::abs(sum) > kSurelyNotFlat * magnitude && std::isfinite(sum)) {
+    return false;
+  }
+  return AreOnALine(positions) || AreEdgesEven(positions);
 }
 
 absl::Status AddPolyline(std::span<const double> positions, const LineIndex* lines, bool is_ring,

@@ -16,6 +16,14 @@ namespace wellspace::formats {
 // Shapes:     positions: n x 2.
 int CountDifferent(std::span<const double> positions);
 
+// Whether a ring encloses nothing: it has fewer than three different positions, they are all on one line, or each of
+// its edges is there an even number of times.
+//
+// Shapes:     positions: n x 2, the first repeated at the end or not.
+// Guarantees: exact.
+// Complexity: O(n); O(n log n) of rings whose area is little beside what it is summed up of.
+bool IsFlat(std::span<const double> positions);
+
 // Adds the points and segments of a ring or a line to the domain.
 //
 // Shapes:     positions: n x 2, n >= 1; lines: where each of them stands, of n, or null for 0 to n - 1.

@@ -57,10 +57,10 @@ class GeoJsonReader {
   bool boolean(bool value) { return Scalar(value ? "true" : "false", nullptr); }
   bool number_integer(int64_t value) {
     // Only numbers with a sign come here: 0 is -0.
-    return Number(value == 0 ? -0.0 : static_cast<double>(value));
+    return Number(value == 0 ? -0.0 : static_cast<double>(value), std::to_string(value));
   }
-  bool number_unsigned(uint64_t value) { return Number(static_cast<double>(value)); }
-  bool number_float(double value, const std::string& /*text*/) { return Number(value); }
+  bool number_unsigned(uint64_t value) { return Number(static_cast<double>(value), std::to_string(value)); }
+  bool number_float(double value, const std::string& text) { return Number(value, text); }
   bool string(std::string& value) { return Scalar({}, &value); }
   bool binary(json::binary_t& /*value*/) { return Fail("expected text"); }
   bool start_object(size_t /*elements*/);
@@ -75,7 +75,8 @@ class GeoJsonReader {
   void Finish() { features_.Finish(); }
 
  private:
-  bool Number(double value);
+  // `text`: as it is written, or the whole number that it is.
+  bool Number(double value, const std::string& text);
   // Null, a boolean or, if it is not null, a string.
   bool Scalar(std::string_view text, const std::string* string);
   bool Property(const double* number, std::string_view text);
@@ -173,17 +174,23 @@ bool GeoJsonReader::Has(Level& object, Member member) {
   return true;
 }
 
-bool GeoJsonReader::Number(double value) {
+bool GeoJsonReader::Number(double value, const std::string& written) {
   if (foreign_depth_ > 0) {
     return true;
   }
   if (geometry_.is_open()) {
+    if (IsRoundedWhole(written, value) && domain_.rounded_numbers++ == 0) {
+      domain_.first_rounded = absl::StrCat(written, " at ", Path());
+    }
     const absl::Status status = geometry_.AddNumber(value);
     return status.ok() || Fail(std::string(status.message()));
   }
   std::string text;
   AppendNumber(value, text);
   if (!levels_.empty() && levels_.back().kind == Level::kProperties) {
+    if (IsRoundedWhole(written, value)) {
+      return Property(nullptr, absl::StrCat(written, ", which no double is"));
+    }
     return Property(&value, text);
   }
   return Scalar(text, nullptr);

@@ -74,7 +74,7 @@ absl::Status Read(InputFile& file, const std::string& path, Kind kind, const Dom
 }
 
 void NoteChanges(PlanarDomain& domain) {
-  const auto note = [&domain](uint64_t count, const char* one, const char* more) {
+  const auto note = [&domain](uint64_t count, const std::string& one, const std::string& more) {
     if (count > 0) {
       domain.notes.push_back(absl::StrCat(domain.name, ": ", count, count == 1 ? one : more));
     }
@@ -85,6 +85,15 @@ void NoteChanges(PlanarDomain& domain) {
        " rings are closed, whose last points are not their first ones");
   note(domain.altitudes, " position has an altitude, which is not used",
        " positions have altitudes, which are not used");
+  note(domain.rounded_numbers,
+       absl::StrCat(" coordinate is a whole number that no double is, and is rounded: ", domain.first_rounded),
+       absl::StrCat(" coordinates are whole numbers that no double is, and are rounded; the first is ",
+                    domain.first_rounded));
+  const std::string first = absl::StrCat("; the first is ", domain.first_flat);
+  note(domain.flat_rings, absl::StrCat(" ring encloses nothing, and is left out", first),
+       absl::StrCat(" rings enclose nothing, and are left out", first));
+  note(domain.flat_lines, absl::StrCat(" line has no length, and is left out", first),
+       absl::StrCat(" lines have no length, and are left out", first));
 }
 
 }  // namespace
@@ -121,7 +130,9 @@ absl::StatusOr<PlanarDomain> ReadPlanarDomain(const std::string& path, const Dom
   domain.name = file.name();
   WELLSPACE_RETURN_IF_ERROR(Read(file, path, kind, options, domain));
   if (domain.points.empty()) {
-    return absl::InvalidArgumentError(absl::StrCat(domain.name, ": no points; expected at least one"));
+    return absl::InvalidArgumentError(absl::StrCat(
+        domain.name, ": no points; expected at least one",
+        domain.first_flat.empty() ? "" : "; what encloses nothing is left out, the first is ", domain.first_flat));
   }
   NoteChanges(domain);
   return domain;

@@ -5,12 +5,13 @@
 //            "segments markers" and a line "index end end [marker]" for each segment; the number of holes and a line
 //            "index x y" for each; the number of regions and a line "index x y attribute [max-area]" for each. The
 //            file may end after the points or any later part. Indices count from 0 or 1, those of ends as the points'.
-//            A region's largest area of 0 or less is none. Faces: kHoles.
+//            A region's largest area of 0 or less is none; one without is the attribute. Faces: kHoles.
 //   geojson  RFC 7946: any geometry, Feature or FeatureCollection. Rings of polygons, closed by repeating the first
 //            position or not, and lines become segments; positions of Point and MultiPoint become points. Coordinates
 //            are taken as those of a plane, altitudes and members that the format does not know are skipped. Two
 //            positions that are equal are two points, but for those that follow each other in a ring or a line, and for
-//            the last of a ring or a closed line. Faces: kEvenOdd; without a polygon kBox.
+//            the last of a ring or a closed line. Rings that enclose nothing and lines without length are left out.
+//            Faces: kUnion, of the features; without a polygon kBox.
 //   geojsonl Texts of geojson, one after the other, in lines of their own or not; the separator of RFC 8142 may stand
 //            before each. Each is a Feature or a geometry, or what a file of geojson may be. A geometry is a feature.
 //   wkt      Well-known text of geometries, one after the other, separated by blanks, line ends or semicolons: POINT,
@@ -71,8 +72,8 @@ bool IsDomainPath(const std::string& path);
 //             (3) Memory is asked for as the file has things, never as it announces them.
 // Complexity: one pass; memory for the domain, and for one geometry of geojson or one polyline of csv.
 // Errors:     of opening and reading; INVALID_ARGUMENT "FILE:LINE: …", in geojson with the path to the value, for what
-//             is not such a file: a number that is none or not finite, an end that is no point, a ring of fewer than
-//             three different points, other counts than announced, an end in the middle; and for a file without points.
+//             is not such a file: a number that is none or not finite, an end that is no point, other
+//             counts than announced, an end in the middle; and for a file without points.
 absl::StatusOr<PlanarDomain> ReadPlanarDomain(const std::string& path, const DomainOptions& options = {});
 
 }  // namespace wellspace::formats

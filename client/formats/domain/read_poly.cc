@@ -153,7 +153,7 @@ absl::Status PolyReader::ReadRegions(std::string_view line) {
   constexpr std::array kNames = {"number of regions"};
   WELLSPACE_RETURN_IF_ERROR(ReadHeader(reader_, line, 1, kNames, {&regions_, 1}));
   uint64_t base = 0;
-  uint64_t without_area = 0;
+  uint64_t with_one_number = 0;
   for (uint64_t region = 0; region < regions_; ++region) {
     if (!reader_.NextContent(line)) {
       return CountError(reader_, regions_, "regions", region);
@@ -170,7 +170,8 @@ absl::Status PolyReader::ReadRegions(std::string_view line) {
       return reader_.Error(absl::StrCat("attribute: ", status.message()));
     }
     if (!fields.Next(field)) {
-      ++without_area;
+      seed.max_area = seed.attribute;  // as Triangle has it
+      ++with_one_number;
     } else if (absl::Status status = TakeFinite(field, seed.max_area); !status.ok()) {
       return reader_.Error(absl::StrCat("largest area: ", status.message()));
     }
@@ -179,10 +180,10 @@ absl::Status PolyReader::ReadRegions(std::string_view line) {
     domain_.seeds.push_back(seed);
     domain_.seed_lines.Add(reader_.line_number());
   }
-  if (without_area > 0) {
-    domain_.notes.push_back(absl::StrCat(
-        domain_.name, ": of ", without_area, without_area == 1 ? " region" : " regions",
-        " the only number is taken for the attribute; a second one would be the largest area of a triangle"));
+  if (with_one_number > 0) {
+    domain_.notes.push_back(
+        absl::StrCat(domain_.name, ": of ", with_one_number, with_one_number == 1 ? " region" : " regions",
+                     " the only number is both the attribute and the largest area of a triangle, as Triangle has it"));
   }
   return absl::OkStatus();
 }

@@ -122,6 +122,22 @@ absl::Status ParseFinite(std::string_view text, double& value) {
   return absl::InvalidArgumentError(absl::StrCat("expected a number, got ", Quote(text)));
 }
 
+bool IsRoundedWhole(std::string_view text, double value) {
+  constexpr double kAllWhole = 9007199254740992;  // doubles up to here have all whole numbers
+  if (!(std::abs(value) >= kAllWhole) || !std::isfinite(value)) {
+    return false;
+  }
+  text.remove_prefix(!text.empty() && (text[0] == '-' || text[0] == '+') ? 1 : 0);
+  text.remove_prefix(std::min(text.find_first_not_of('0'), text.size()));
+  if (text.find_first_not_of("0123456789") != std::string_view::npos) {
+    return false;
+  }
+  char buffer[320];
+  const char* const end =
+      std::to_chars(buffer, buffer + sizeof(buffer), std::abs(value), std::chars_format::fixed, 0).ptr;
+  return text != std::string_view(buffer, static_cast<size_t>(end - buffer));
+}
+
 bool ParseUnsigned(std::string_view text, uint64_t limit, uint64_t& value) {
   const char* end = text.data() + text.size();
   const std::from_chars_result result = std::from_chars(text.data(), end, value);

@@ -30,6 +30,9 @@ bool IsNumber(std::string_view text);
 //             range of double.
 absl::Status ParseFinite(std::string_view text, double& value);
 
+// Whether `text` is a whole number, without a point and an exponent, that `value`, which it was read as, is not.
+bool IsRoundedWhole(std::string_view text, double value);
+
 // Reads the whole of `text` as an unsigned decimal number of at most `limit`.
 bool ParseUnsigned(std::string_view text, uint64_t limit, uint64_t& value);
 

@@ -96,7 +96,6 @@ TEST_F(DomainCommandsTest, CheckHoldsADomainToAllThatIsAsked) {
   const std::string cloud = folder_.Write("cloud.csv", "0,0\n");
   EXPECT_EQ(check({"--rho", "2", "--criterion", "well-spaced"}).exit_code, 2);
   EXPECT_EQ(check({"--cloud", cloud}).exit_code, 2);
-  EXPECT_EQ(check({"--cloud", Path("frame.poly"), "--merge", "0.1"}).exit_code, 2);
 }
 
 TEST_F(DomainCommandsTest, PolyWithAHoleAndMarkers) {
@@ -179,6 +178,32 @@ TEST_F(DomainCommandsTest, CheckTakesEachStretchOfASegmentByItself) {
   ExpectValid("zone.geojson");
 }
 
+TEST_F(DomainCommandsTest, FeaturesAreUnited) {
+  // A zone in a city, one on its border, and one feature that fills the hole of another.
+  Mesh("zone.geojson", FeaturesText({SquareFeature(0, 0, 10, 10), SquareFeature(3, 3, 6, 6)}));
+  ExpectValid("zone.geojson");
+  EXPECT_NEAR(AreaOf(*formats::ReadMesh(Path("out.msh"))), 100, 1e-9);
+  Mesh("zone.geojson", FeaturesText({SquareFeature(0, 0, 10, 10), SquareFeature(0, 1, 3, 4)}));
+  ExpectValid("zone.geojson");
+  EXPECT_NEAR(AreaOf(*formats::ReadMesh(Path("out.msh"))), 100, 1e-9);
+  // Features that cross, and a region each: the smaller one has what both hold.
+  const std::string text = FeaturesText({SquareFeature(0, 0, 10, 10, 1), SquareFeature(8, 8, 12, 12, 2)});
+  Mesh("cross.geojson", text, {"--split-crossings", "--region-property", "r"});
+  const auto mesh = formats::ReadMesh(Path("out.msh"));
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  EXPECT_NEAR(AreaOf(*mesh, 1), 96, 1e-9);
+  EXPECT_NEAR(AreaOf(*mesh, 2), 16, 1e-9);
+  const RunResult check =
+      RunWellspace({"check", Path("out.msh"), "--cloud", Path("cross.geojson"), "--region-property", "r"});
+  EXPECT_EQ(check.exit_code, 0) << check.out;
+  // Within a feature rings turn inside to outside, and over all of them if that is asked for.
+  Mesh("parts.geojson", R"({"type": "Feature", "properties": {}, "geometry": {"type": "MultiPolygon", "coordinates":
+      [[[[0,0],[9,0],[9,9],[0,9]]], [[[1,1],[2,1],[2,2],[1,2]]]]}})");
+  EXPECT_NEAR(AreaOf(*formats::ReadMesh(Path("out.msh"))), 80, 1e-9);
+  Mesh("cross.geojson", text, {"--split-crossings", "--faces", "even-odd"});
+  EXPECT_NEAR(AreaOf(*formats::ReadMesh(Path("out.msh"))), 100 + 16 - 8, 1e-9);
+}
+
 TEST_F(DomainCommandsTest, CheckKnowsTheFaces) {
   const std::string text = FeaturesText({SquareFeature(0, 0, 10, 10, 1), SquareFeature(3, 3, 6, 6, 2)});
   Mesh("zone.geojson", text, {"--faces", "holes"});
@@ -188,9 +213,10 @@ TEST_F(DomainCommandsTest, CheckKnowsTheFaces) {
     return RunWellspace(arguments);
   };
   EXPECT_EQ(check({"--faces", "holes"}).exit_code, 0);
-  const RunResult by_default = check({});
-  EXPECT_EQ(by_default.exit_code, 1);
-  EXPECT_THAT(by_default.out, HasSubstr("an even number of rings surrounds it"));
+  EXPECT_EQ(check({}).exit_code, 0);
+  const RunResult even_odd = check({"--faces", "even-odd"});
+  EXPECT_EQ(even_odd.exit_code, 1);
+  EXPECT_THAT(even_odd.out, HasSubstr("an even number of rings surrounds it"));
   // Regions, too, if it is told where they are.
   EXPECT_THAT(check({"--faces", "holes", "--region-property", "r"}).out, HasSubstr("the mesh has no regions"));
   Mesh("zone.geojson", text, {"--faces", "holes", "--region-property", "r"});
@@ -279,6 +305,74 @@ TEST_F(DomainCommandsTest, PointsTooNearToASegmentAreSnappedTo) {
   EXPECT_EQ(stats["domain"]["crossings"], 0);
   constexpr char kCross[] = "4 2 0 0\n1 0 0\n2 2 2\n3 0 2\n4 2 0\n4 0\n1 1 2\n2 3 4\n3 1 3\n4 2 4\n";
   EXPECT_THAT(MeshFails("cross.poly", kCross, {"--snap"}), HasSubstr("cross at (1, 1)"));
+}
+
+TEST_F(DomainCommandsTest, SegmentsAreSnappedAndPointsMergedAcrossAGap) {
+  // Two wards whose border was drawn twice, 0.001 apart, with a corner more on one side.
+  const std::string wards = R"({"type": "FeatureCollection", "features": [
+      {"type": "Feature", "properties": {"r": 1}, "geometry": {"type": "Polygon", "coordinates":
+          [[[0, 0], [5, 0], [5, 10], [0, 10]]]}},
+      {"type": "Feature", "properties": {"r": 2}, "geometry": {"type": "Polygon", "coordinates":
+          [[[5.001, 0], [10, 0], [10, 10], [5.001, 10], [5.0004, 4]]]}}]})";
+  const nlohmann::json apart = Mesh("wards.geojson", wards, {"--min-angle", "20"});
+  EXPECT_EQ(apart["merged_points"], 0);
+  for (const std::vector<std::string>& lengths : std::vector<std::vector<std::string>>{
+           {"--merge", "0.01", "--snap", "0.01"}, {"--merge", "0.1%", "--snap", "0.1%"}}) {
+    std::vector<std::string> options = lengths;
+    options.insert(options.end(), {"--region-property", "r"});
+    const nlohmann::json stats = Mesh("wards.geojson", wards, options);
+    EXPECT_EQ(stats["merged_points"], 2);
+    EXPECT_EQ(stats["domain"]["near_points"], 1);
+    EXPECT_LT(stats["vertices"], 200);
+    const auto mesh = formats::ReadMesh(Path("out.msh"));
+    ASSERT_TRUE(mesh.ok()) << mesh.status();
+    EXPECT_NEAR(AreaOf(*mesh), 100, 1e-9);
+    EXPECT_NEAR(AreaOf(*mesh, 1), 50 + 0.5 * 10 * 0.0004, 1e-9);
+    std::vector<std::string> check = {"check", Path("out.msh"), "--cloud", Path("wards.geojson")};
+    check.insert(check.end(), options.begin(), options.end());
+    const RunResult result = RunWellspace(check);
+    EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
+    EXPECT_EQ(RunWellspace({"check", Path("out.msh"), "--cloud", Path("wards.geojson")}).exit_code, 1);
+  }
+  EXPECT_THAT(MeshFails("wards.geojson", wards, {"--snap=-1"}), HasSubstr("--snap"));
+  EXPECT_THAT(MeshFails("wards.geojson", wards, {"--merge", "101%"}), HasSubstr("0.1%"));
+}
+
+TEST_F(DomainCommandsTest, CornersThatDoublesCannotServeAreOne) {
+  // The second triangle has a corner that is that of the first but for its last bit.
+  const std::string twins = FeaturesText({R"({"type": "Feature", "properties": {}, "geometry": {"type": "Polygon",
+           "coordinates": [[[0, 0], [0.3, 0], [0.3, 0.3]]]}})",
+                                          R"({"type": "Feature", "properties": {}, "geometry": {"type": "Polygon",
+           "coordinates": [[[0.30000000000000004, 0.3], [0.6, 0.3], [0.6, 0.6]]]}})"});
+  const nlohmann::json stats = Mesh("twins.geojson", twins);
+  EXPECT_EQ(stats["merged_points"], 1);
+  EXPECT_EQ(stats["vertices"], 5);
+  ExpectValid("twins.geojson");
+}
+
+TEST_F(DomainCommandsTest, RegionsOfTrianglesFilesAreLargestAreasAndNumbersOfTheirOwn) {
+  const std::string square = "4 2 0 0\n1 0 0\n2 1 0\n3 1 1\n4 0 1\n4 0\n1 1 2\n2 2 3\n3 3 4\n4 4 1\n0\n";
+  const nlohmann::json stats = Mesh("area.poly", square + "1\n1 0.5 0.5 0.05\n");
+  EXPECT_GE(stats["simplices"], 20);
+  EXPECT_THAT(stats["notes"].dump(), AllOf(HasSubstr("as Triangle has it"), HasSubstr("0.05 region 1")));
+  ExpectValid("area.poly");
+  const std::string halves =
+      "6 2 0 0\n1 0 0\n2 1 0\n3 2 0\n4 2 1\n5 1 1\n6 0 1\n7 0\n1 1 2\n2 2 3\n3 3 4\n4 4 5\n5 5 6\n6 6 1\n7 2 5\n0\n";
+  Mesh("halves.poly", halves + "2\n1 0.5 0.5 1 -1\n2 1.5 0.5 0.25 -1\n");
+  const auto mesh = formats::ReadMesh(Path("out.msh"));
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  EXPECT_NEAR(AreaOf(*mesh, 1), 1, 1e-12);
+  EXPECT_NEAR(AreaOf(*mesh, 2), 1, 1e-12);
+  ExpectValid("halves.poly");
+}
+
+TEST_F(DomainCommandsTest, SeedsOutsideAreTold) {
+  const std::string square = "4 2 0 0\n1 0 0\n2 1 0\n3 1 1\n4 0 1\n4 0\n1 1 2\n2 2 3\n3 3 4\n4 4 1\n";
+  const nlohmann::json stats = Mesh("out.poly", square + "1\n1 5 5\n2\n1 0.5 0.5 1 -1\n2 7 7 2 -1\n");
+  EXPECT_EQ(stats["domain"]["unused_seeds"], 2);
+  EXPECT_THAT(stats["notes"].dump(), AllOf(HasSubstr("out.poly:12: the hole at (5, 5) lies outside of what is meshed"),
+                                           HasSubstr("so does 1 other")));
+  EXPECT_EQ(Mesh("in.poly", square + "0\n")["domain"]["unused_seeds"], 0);
 }
 
 TEST_F(DomainCommandsTest, WhatEnclosesNothingSaysSo) {

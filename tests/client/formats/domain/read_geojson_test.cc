@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "tests/client/formats/domain/read_domain_fixture.h"
 
 namespace wellspace::formats {
@@ -53,7 +54,7 @@ TEST_F(ReadGeoJsonTest, ReadsEveryGeometry) {
   EXPECT_THAT(polygon.points, ElementsAre(0, 0, 4, 0, 4, 4, 0, 4, 1, 1, 3, 1, 3, 3, 1, 3));
   EXPECT_THAT(polygon.segments, ElementsAre(0, 1, 1, 2, 2, 3, 3, 0, 4, 5, 5, 6, 6, 7, 7, 4));
   EXPECT_THAT(polygon.markers, SizeIs(8));
-  EXPECT_EQ(polygon.faces, PlanarDomain::FaceRule::kEvenOdd);
+  EXPECT_EQ(polygon.faces, PlanarDomain::FaceRule::kUnion);
   EXPECT_THAT(polygon.is_line, IsEmpty());
   EXPECT_EQ(Point(polygon, 6), "a.geojson:1: coordinates[1][2]");
   EXPECT_EQ(Without(polygon.SegmentOrigin(7)), "a.geojson:1: coordinates[1][3]");
@@ -139,7 +140,7 @@ TEST_F(ReadGeoJsonTest, LinesBesidePolygonsAreTold) {
   const PlanarDomain domain =
       ReadGood("a.geojson", Features({Feature(Geometry("LineString", "[[0,0],[4,4]]")),
                                       Feature(Geometry("Polygon", "[[[0,0],[4,0],[4,4],[0,4]]]"))}));
-  EXPECT_EQ(domain.faces, PlanarDomain::FaceRule::kEvenOdd);
+  EXPECT_EQ(domain.faces, PlanarDomain::FaceRule::kUnion);
   EXPECT_THAT(domain.is_line, ElementsAre(1, 0, 0, 0, 0));
 }
 
@@ -195,11 +196,60 @@ TEST_F(ReadGeoJsonTest, PropertiesAreMarkersAndAttributes) {
 }
 
 TEST_F(ReadGeoJsonTest, APolygonWithoutInsideGetsNoRegion) {
+  // Its hole is all of it.
   const PlanarDomain domain =
-      ReadGood("a.geojson", Feature(Geometry("Polygon", "[[[0,0],[1,1],[2,2],[0,0]]]"), R"({"kind": 1})"),
+      ReadGood("a.geojson", Feature(Geometry("Polygon", "[[[0,0],[1,0],[2,2]],[[2,2],[1,0],[0,0]]]"), R"({"kind": 1})"),
                {.region_property = "kind"});
   EXPECT_THAT(domain.seeds, IsEmpty());
-  EXPECT_THAT(domain.notes, ElementsAre(HasSubstr("1 polygon has no inside, and gets no region")));
+  EXPECT_THAT(domain.notes, ::testing::Contains(HasSubstr("1 polygon has no inside, and gets no region")));
+}
+
+TEST_F(ReadGeoJsonTest, WhatEnclosesNothingIsLeftOutAndCounted) {
+  struct Case {
+    const char* type;
+    const char* coordinates;
+    size_t points;
+    size_t segments;
+    const char* note;
+  };
+  for (const Case& one : {
+           Case{"Polygon", "[[[0,0],[4,0],[0,4]],[[1,1],[2,2]]]", 3, 3,
+                "1 ring encloses nothing, and is left out; the first is coordinates[1] in line 1"},
+           {"Polygon", "[[[0,0],[4,0],[0,4]],[[1,1],[1,1],[1,1],[1,1]]]", 3, 3, "1 ring encloses nothing"},
+           {"Polygon", "[[[0,0],[4,0],[0,4]],[]]", 3, 3, "1 ring encloses nothing"},
+           {"Polygon", "[[[0,0],[4,0],[0,4]],[[0.1,0.1],[0.2,0.2],[0.4,0.4],[0.1,0.1]]]", 3, 3, "1 ring encloses"},
+           {"Polygon", "[[[0,0],[4,0],[0,4]],[[1,1],[2,1],[2,2],[2,1],[1,1]]]", 3, 3, "1 ring encloses nothing"},
+           {"MultiPolygon", "[[[[0,0],[1,0],[0,1]]],[[[5,5],[6,5]],[[7,7],[8,7],[7,8]]]]", 3, 3,
+            "2 rings enclose nothing, and are left out; the first is coordinates[1][0] in line 1"},
+           {"LineString", "[[1,1],[1,1]]", 0, 0, ""},
+           {"MultiLineString", "[[[0,0],[1,1]],[[1,1],[1,1]]]", 2, 1,
+            "1 line has no length, and is left out; the first is coordinates[1] in line 1"},
+       }) {
+    SCOPED_TRACE(one.coordinates);
+    if (one.points == 0) {
+      EXPECT_THAT(ReadBad("a.geojson", Geometry(one.type, one.coordinates)),
+                  AllOf(HasSubstr("no points"), HasSubstr("left out, the first is coordinates in line 1")));
+      continue;
+    }
+    const PlanarDomain domain = ReadGeometry(one.type, one.coordinates);
+    EXPECT_EQ(domain.point_count(), one.points);
+    EXPECT_EQ(domain.segment_count(), one.segments);
+    EXPECT_THAT(Without(absl::StrJoin(domain.notes, "; ")), HasSubstr(one.note));
+  }
+  // What is hardly more than a line is a ring, and so is one that turns both ways.
+  EXPECT_EQ(ReadGeometry("Polygon", "[[[0,0],[1,1],[2,2.0000000000000004]]]").segment_count(), 3u);
+  EXPECT_EQ(ReadGeometry("Polygon", "[[[0,0],[2,2],[2,0],[0,2]]]").segment_count(), 4u);
+}
+
+TEST_F(ReadGeoJsonTest, FeaturesAreGroups) {
+  const std::string square = Geometry("Polygon", "[" + Square(0, 0, 4) + "]");
+  const std::string two = Geometry("MultiPolygon", "[[" + Square(10, 0, 1) + "],[" + Square(20, 0, 1) + "]]");
+  EXPECT_THAT(ReadGood("a.geojson", Feature(two)).groups, IsEmpty());
+  EXPECT_THAT(ReadGood("a.geojson", two).groups, IsEmpty());
+  const PlanarDomain domain = ReadGood("a.geojson", Features({Feature(square), Feature(two), Feature("null")}));
+  std::vector<uint32_t> groups(4, 0);
+  groups.resize(12, 4);
+  EXPECT_EQ(domain.groups, groups);
 }
 
 TEST_F(ReadGeoJsonTest, LongitudesAroundTheWorldGetAWarning) {
@@ -219,6 +269,18 @@ TEST_F(ReadGeoJsonTest, NumbersAreReadToTheBit) {
   EXPECT_TRUE(std::signbit(domain.points[3]) && std::signbit(domain.points[4]));
 }
 
+TEST_F(ReadGeoJsonTest, WholeNumbersThatNoDoubleIsAreNamed) {
+  const PlanarDomain domain = ReadGeometry("MultiPoint", "[[1,2],[9007199254740993,3],[18446744073709551615,1e30]]");
+  EXPECT_THAT(domain.notes, ElementsAre(HasSubstr("2 coordinates are whole numbers that no double is, and are rounded; "
+                                                  "the first is 9007199254740993 at coordinates[1][0]")));
+  EXPECT_THAT(ReadGeometry("Point", "[9007199254740992,1]").notes, IsEmpty());
+  const std::string feature = Feature(Geometry("Polygon", "[" + Square(0, 0, 4) + "]"), R"({"r": 9007199254740993})");
+  EXPECT_THAT(
+      ReadBad("a.geojson", feature, {.region_property = "r"}),
+      HasSubstr("properties.r: expected a number for the attribute of the region, got 9007199254740993, which no "
+                "double is"));
+}
+
 TEST_F(ReadGeoJsonTest, ErrorsOfGeometryNameThePath) {
   struct Case {
     const char* type;
@@ -226,16 +288,7 @@ TEST_F(ReadGeoJsonTest, ErrorsOfGeometryNameThePath) {
     const char* message;
   };
   for (const Case& one : {
-           Case{"Polygon", "[[[0,0],[1,0],[0,0]]]",
-                "coordinates[0]: expected a ring of at least 3 different points, got 2"},
-           {"Polygon", "[[[0,0],[1,0],[0,0],[1,0]]]", "coordinates[0]: expected a ring of at least 3 different points"},
-           {"Polygon", "[[[0,0],[1,0],[0,1]],[[5,5],[5,5],[5,5]]]", "coordinates[1]: expected a ring of at least 3"},
-           {"Polygon", "[[]]", "coordinates[0]: expected a ring of at least 3 different points, got 0"},
-           {"MultiPolygon", "[[[[0,0],[1,0],[0,1]]],[[[0,0],[1,0]]]]",
-            "coordinates[1][0]: expected a ring of at least 3"},
-           {"LineString", "[[1,1]]", "coordinates: expected a line of at least 2 different points, got 1"},
-           {"MultiLineString", "[[[0,0],[1,1]],[[1,1],[1,1]]]", "coordinates[1]: expected a line of at least 2"},
-           {"LineString", "[[0,0],[1]]", "coordinates[1][1]: expected a position of at least 2 numbers, got 1"},
+           Case{"LineString", "[[0,0],[1]]", "coordinates[1][1]: expected a position of at least 2 numbers, got 1"},
            {"LineString", "[[0,0],[]]", "coordinates: expected a position of at least 2 numbers, got an empty array"},
            {"LineString", "[0,0]",
             "coordinates: expected each position of a LineString in 2 nested arrays, its own "
@@ -377,7 +430,7 @@ TEST_F(ReadGeoJsonTest, ReadsTheWorld) {
   ASSERT_TRUE(land.ok()) << land.status();
   EXPECT_EQ(land->point_count(), 5000u);
   EXPECT_EQ(land->segment_count(), 5000u);
-  EXPECT_EQ(land->faces, PlanarDomain::FaceRule::kEvenOdd);
+  EXPECT_EQ(land->faces, PlanarDomain::FaceRule::kUnion);
   EXPECT_EQ(land->unclosed_rings, 0u);
   EXPECT_EQ(land->repeated_points, 0u);
 }

@@ -92,10 +92,11 @@ TEST_F(ReadPolyTest, MissingMarkersAreZero) {
   EXPECT_THAT(domain.markers, ElementsAre(0, 3));
 }
 
-TEST_F(ReadPolyTest, TheOnlyNumberOfARegionIsItsAttribute) {
+TEST_F(ReadPolyTest, TheOnlyNumberOfARegionIsItsAttributeAndItsLargestArea) {
   const PlanarDomain domain = ReadGood("a.poly", "1 2\n0 0 0\n0\n0\n1\n0 0.5 0.5 4\n");
-  EXPECT_THAT(domain.seeds, ElementsAre(Seed{0.5, 0.5, false, 4, 0}));
-  EXPECT_THAT(domain.notes, ElementsAre(HasSubstr("of 1 region the only number is taken for the attribute")));
+  EXPECT_THAT(domain.seeds, ElementsAre(Seed{0.5, 0.5, false, 4, 4}));
+  EXPECT_THAT(domain.notes,
+              ElementsAre(HasSubstr("of 1 region the only number is both the attribute and the largest area")));
 }
 
 TEST_F(ReadPolyTest, PointsMayBeInTheNodeFileBeside) {

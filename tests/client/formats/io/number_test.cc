@@ -23,6 +23,22 @@ std::string Within(double value, size_t width) {
   return text;
 }
 
+TEST(NumberTest, WholeNumbersThatNoDoubleIsAreTold) {
+  const auto is_rounded = [](std::string_view text) {
+    double value = 0;
+    EXPECT_TRUE(ParseFinite(text, value).ok()) << text;
+    return IsRoundedWhole(text, value);
+  };
+  for (const char* kept : {"0", "-0", "9007199254740992", "-9007199254740994", "0009007199254740992", "1e300",
+                           "9007199254740993.0", "1152921504606846976", "100000000000000000000"}) {
+    EXPECT_FALSE(is_rounded(kept)) << kept;
+  }
+  for (const char* rounded :
+       {"9007199254740993", "-9007199254740993", "18446744073709551615", "123456789012345678901234567890"}) {
+    EXPECT_TRUE(is_rounded(rounded)) << rounded;
+  }
+}
+
 TEST(NumberTest, WhatFitsIsExactInItsShortestForm) {
   EXPECT_EQ(Within(0.5, 20), "0.5");
   EXPECT_EQ(Within(-0.0, 20), "-0");

@@ -1,0 +1,36 @@
+// Lengths that may be a share of the cloud they are about.
+#ifndef WELLSPACE_CLIENT_CLI_LENGTH_H_
+#define WELLSPACE_CLIENT_CLI_LENGTH_H_
+
+#include <CLI/CLI.hpp>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "absl/status/statusor.h"
+
+namespace wellspace::cli {
+
+// A length: a number in the unit of the points, or a share of the longest side of their bounding box.
+struct Length {
+  double value = 0;
+  bool is_share = false;
+
+  // Shapes:     points: n x dimension, row-major.
+  // Complexity: O(1); O(n) of a share.
+  double Of(std::span<const double> points, int dimension) const;
+
+  // "0.01" or "0.5%".
+  //
+  // Errors:     INVALID_ARGUMENT, a message without the option.
+  static absl::StatusOr<Length> Parse(std::string_view text);
+};
+
+// A length, or "none": as if the option were not given.
+CLI::Option* AddLength(CLI::App& command, const std::string& name, std::optional<Length>& value,
+                       const std::string& description);
+
+}  // namespace wellspace::cli
+
+#endif  // WELLSPACE_CLIENT_CLI_LENGTH_H_
