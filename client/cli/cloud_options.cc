@@ -62,6 +62,9 @@ void AddNotes(const CloudReport& report, Json& json) {
   if (report.skipped_points.has_value()) {
     json["skipped_points"] = *report.skipped_points;
   }
+  if (report.skipped_sizes.has_value()) {
+    json["skipped_sizes"] = *report.skipped_sizes;
+  }
   if (!report.notes.empty()) {
     json["notes"] = report.notes;
   }

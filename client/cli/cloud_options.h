@@ -23,6 +23,7 @@ void AddCloudOptions(CLI::App& command, formats::CloudOptions& options, const st
 struct CloudReport {
   std::vector<std::string> notes = {};
   std::optional<uint64_t> skipped_points = {};  // if they were to be skipped
+  std::optional<uint64_t> skipped_sizes = {};   // the same of a size field, if there is one
 };
 
 // Of a formats::PointCloud or a client::CloudFile.

@@ -88,7 +88,7 @@ absl::StatusOr<client::MeshOptions> MeshingOptions::OptionsFor(const formats::Po
   WELLSPACE_ASSIGN_OR_RETURN(client::MeshOptions options, parameters_.For(cloud.dimension, cloud.points));
   options.features = domain_.features();
   WELLSPACE_ASSIGN_OR_RETURN(options.size_samples,
-                             size_field_.Read(cloud.dimension));
+                             size_field_.Read(cloud.dimension, cloud_options_.skip_invalid, options.gradation));
   if (!options.threads.has_value()) {
     options.threads = HelpfulThreads(options, cloud.points);
   }
@@ -106,6 +106,7 @@ int MeshingOptions::Run(const Work& work) {
   if (!options.ok()) {
     return ReportError(options.status(), remote_.format());
   }
+  NoteSizes(size_field_, cloud_options_, remote_.format(), remote_.quiet(), report_);
   return remote_.Run([&](client::Client& client, const client::CallOptions& call, const Interrupt& /*interrupt*/) {
     const absl::Status status = work(client, *options, *cloud, call);
     const absl::Status explained = size_field_.WithOrigins(parameters_.Explain(status));

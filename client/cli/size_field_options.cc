@@ -16,6 +16,13 @@ namespace {
 
 constexpr char kRadius[] = "radius";
 constexpr char kEdge[] = "edge";
+constexpr char kGrow[] = "grow";
+constexpr char kInterpolate[] = "interpolate";
+
+// Of sizes at points: MeshParameters.gradation. The circumradius that stands for an edge of length 1, at least, in any
+// dimension: MeshParameters.edge_length.
+constexpr double kDefaultGradation = 0.3;
+constexpr double kLeastRadiusOfEdge = 0.733;
 
 }  // namespace
 
@@ -30,9 +37,9 @@ CLI::Option* SizeFieldOptions::AddTo(CLI::App& command) {
       command
           .add_option("--size-field", path_,
                       "File of points with a size each, from which sizes grow by --gradation: .csv and the like with "
-                      "columns x, y, (z,) h; or .vtu, .msh, .npz with h at their points; or in 2-D a raster, .asc "
-                      "(ESRI) or .tif (GeoTIFF), of sizes at the "
-                      "centres of its cells")
+                       "columns x, y, (z,) h; or .vtu, .msh, .npz with h at their points; or in 2-D a raster, .asc "
+                       "(ESRI) or .tif (GeoTIFF), of sizes at the centres of its cells. A size holds at its point, "
+                       "wherever that is, and grows from there")
           ->type_name("FILE");
   command
       .add_option_function<std::string>(
@@ -44,16 +51,31 @@ CLI::Option* SizeFieldOptions::AddTo(CLI::App& command) {
           "--edge-length; default: radius")
       ->check(CLI::IsMember({kRadius, kEdge}))
       ->needs(field);
+  command
+      .add_option_function<std::string>(
+          "--size-field-between", [this](const std::string& name) { interpolates_ = name == kInterpolate; },
+          "What holds between the points of --size-field: grow, sizes grow from each, so that they are larger between "
+          "two; or interpolate, of .vtu, .msh and .npz with simplices: sizes are interpolated linearly between the "
+          "vertices of a simplex, as Gmsh and MMG have it, within 10 %, and grow no faster than --gradation; default: "
+          "grow")
+      ->check(CLI::IsMember({kGrow, kInterpolate}))
+      ->needs(field);
   return field;
 }
 
 void SizeFieldOptions::AddFilesTo(formats::FilePlan& files) const { files.Reads("--size-field", path_); }
 
-absl::StatusOr<std::shared_ptr<const client::SizeSamples>> SizeFieldOptions::Read(int dimension) {
+absl::StatusOr<std::shared_ptr<const client::SizeSamples>> SizeFieldOptions::Read(int dimension, bool skip_invalid,
+                                                                                  std::optional<double> gradation) {
   if (path_.empty()) {
     return nullptr;
   }
-  WELLSPACE_ASSIGN_OR_RETURN(formats::SizedPoints read, formats::ReadSizes(path_, dimension));
+  formats::SizeOptions options{.skip_invalid = skip_invalid};
+  if (interpolates_) {
+    options.growth_to_interpolate = gradation.value_or(kDefaultGradation);
+    options.radius_of_size = measure_ == client::SizeMeasure::kEdgeLength ? kLeastRadiusOfEdge : 1;
+  }
+  WELLSPACE_ASSIGN_OR_RETURN(formats::SizedPoints read, formats::ReadSizes(path_, dimension, options));
   auto samples = std::make_shared<client::SizeSamples>();
   samples->points = std::exchange(read.cloud.points, {});
   samples->sizes = std::move(read.sizes);
@@ -73,6 +95,18 @@ absl::Status SizeFieldOptions::WithOrigins(const absl::Status& status) const {
     }
   }
   return status;
+}
+
+void NoteSizes(const SizeFieldOptions& field, const formats::CloudOptions& options, OutputFormat format, bool quiet,
+               CloudReport& report) {
+  if (!field.IsGiven()) {
+    return;
+  }
+  PrintNotes(ReportOf(options, field.notes(), field.skipped()), format, quiet);
+  report.notes.insert(report.notes.end(), field.notes().begin(), field.notes().end());
+  if (options.skip_invalid) {
+    report.skipped_sizes = field.skipped();
+  }
 }
 
 }  // namespace wellspace::cli

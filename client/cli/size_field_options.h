@@ -3,14 +3,19 @@
 #define WELLSPACE_CLIENT_CLI_SIZE_FIELD_OPTIONS_H_
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "client/cli/cloud_options.h"
+#include "client/cli/exit_codes.h"
 #include "client/formats/cloud.h"
 #include "client/formats/file_plan.h"
+#include "client/formats/read_cloud.h"
 #include "client/types.h"
 
 namespace wellspace::cli {
@@ -31,10 +36,16 @@ class SizeFieldOptions {
   bool IsGiven() const { return !path_.empty(); }
   void AddFilesTo(formats::FilePlan& files) const;
 
-  // Reads the file; null if there is none.
+  // Reads the file; null if there is none. With `skip_invalid` sizes that are missing or not finite are left out.
+  // `gradation`: what is asked for; none: the default.
   //
   // Errors:     those of formats::ReadSizes.
-  absl::StatusOr<std::shared_ptr<const client::SizeSamples>> Read(int dimension);
+  absl::StatusOr<std::shared_ptr<const client::SizeSamples>> Read(int dimension, bool skip_invalid,
+                                                                  std::optional<double> gradation);
+
+  // What was found while the file was read; how many sizes were left out.
+  const std::vector<std::string>& notes() const { return origins_.notes; }
+  uint64_t skipped() const { return origins_.skipped; }
 
   // `status`, with the place in the file of the sample that it names.
   absl::Status WithOrigins(const absl::Status& status) const;
@@ -42,8 +53,13 @@ class SizeFieldOptions {
  private:
   std::string path_;
   client::SizeMeasure measure_ = client::SizeMeasure::kCircumradius;
+  bool interpolates_ = false;
   formats::PointCloud origins_;  // of the samples, without their coordinates
 };
+
+// Prints what was found while the field was read, as PrintNotes does, and adds it to `report`.
+void NoteSizes(const SizeFieldOptions& field, const formats::CloudOptions& options, OutputFormat format, bool quiet,
+               CloudReport& report);
 
 }  // namespace wellspace::cli
 

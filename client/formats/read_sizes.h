@@ -16,6 +16,7 @@
 #define WELLSPACE_CLIENT_FORMATS_READ_SIZES_H_
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -30,12 +31,24 @@ struct SizedPoints {
   std::vector<double> sizes;  // of each, above 0 and finite
 };
 
-// Reads the sizes of `path` at points of `dimension`, in the order of the file.
+struct SizeOptions {
+  // Points are left out of which a coordinate or the size is missing, NaN or infinite; how many is in `skipped` and in
+  // a note.
+  bool skip_invalid = false;
+  // Sizes are interpolated linearly between the vertices of the simplices of a mesh, rather than grow from its vertices
+  // alone: points are added between them. This is how fast circumradii grow with the distance from a point; a size is
+  // `radius_of_size` of these.
+  std::optional<double> growth_to_interpolate{};
+  double radius_of_size = 1;
+};
+
+// Reads the sizes of `path` at points of `dimension`, in the order of the file; those that are added come last.
 //
 // Complexity: one pass over the file; memory for all.
 // Errors:     of opening and reading; INVALID_ARGUMENT "FILE:LINE: …" or "FILE[POINT]: …" for what are no sizes at
-//             finite points of this dimension, and for a file without any.
-absl::StatusOr<SizedPoints> ReadSizes(const std::string& path, int dimension);
+//             finite points of this dimension, and for a file without any; and to interpolate for a file without
+//             simplices, or for more points than 10 million.
+absl::StatusOr<SizedPoints> ReadSizes(const std::string& path, int dimension, const SizeOptions& options = {});
 
 }  // namespace wellspace::formats
 

@@ -194,7 +194,7 @@ absl::StatusOr<WantedSizes> CheckCommand::Sizes(int dimension) {
     sizes.boxes.push_back({std::move(box.low), std::move(box.high), box.max_circumradius});
   }
   WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<const client::SizeSamples> samples,
-                             size_field.Read(dimension));
+                             size_field.Read(dimension, cloud_options.skip_invalid, gradation));
   if (samples != nullptr) {
     sizes.samples = {samples->points, samples->sizes,
                      samples->measure == client::SizeMeasure::kEdgeLength ? core::SizeMeasure::kEdgeLength
@@ -430,6 +430,7 @@ int CheckCommand::Run() {
   if (!cloud.ok()) {
     return ReportError(cloud.status(), format);
   }
+  NoteSizes(size_field, cloud_options, format, /*quiet=*/false, cloud_report);
   const core::MeshView view = {
       .dimension = mesh->dimension, .points = mesh->points, .simplices = mesh->simplices, .weights = mesh->weights};
   absl::Status status = core::ValidateIndices(view);

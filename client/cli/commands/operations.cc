@@ -61,6 +61,7 @@ struct OperationCommand {
   ParameterOptions parameters;
   std::string name;
   SizeFieldOptions sizes;
+  formats::CloudOptions reading_sizes;
   bool no_sizes = false;
   bool restart = false;
   bool detach = false;
@@ -79,8 +80,13 @@ absl::Status OperationCommand::SetSizes(client::Client& client, client::CallOpti
   client::SizeSamples samples;
   if (sizes.IsGiven()) {
     WELLSPACE_ASSIGN_OR_RETURN(const client::Session session, client.GetSession(name, call));
+    WELLSPACE_ASSIGN_OR_RETURN(const client::MeshOptions wanted, parameters.Replace(session.parameters));
+    const std::optional<double> gradation = wanted.gradation;
     const Interrupt::AtOnce reading(interrupt);
-    WELLSPACE_ASSIGN_OR_RETURN(const auto read, sizes.Read(session.parameters.dimension));
+    WELLSPACE_ASSIGN_OR_RETURN(const auto read,
+                               sizes.Read(session.parameters.dimension, reading_sizes.skip_invalid, gradation));
+    CloudReport report;
+    NoteSizes(sizes, reading_sizes, remote.format(), remote.quiet(), report);
     samples = *read;
   } else if (!no_sizes) {
     return absl::OkStatus();
@@ -191,6 +197,12 @@ void AddOperationCommands(CLI::App& app, int& exit_code) {
   AddSession(*refine_app, refine->name);
   refine->parameters.AddQualityTo(*refine_app);
   CLI::Option* field = refine->sizes.AddTo(*refine_app);
+  refine_app
+      ->add_flag(
+          "--skip-invalid", refine->reading_sizes.skip_invalid,
+          "Leave out sizes that, or a coordinate of which, are missing (empty, NA), NaN or infinite, and say how "
+          "many; default: the first one is an error")
+      ->needs(field);
   refine_app
       ->add_flag("--no-size-field", refine->no_sizes,
                  "The session has no sizes at points any more; without this and --size-field it keeps those it has")

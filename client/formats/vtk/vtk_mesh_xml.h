@@ -73,7 +73,7 @@ class VtkMeshXmlReader : public VtkXmlReader {
       return ReadArray<double>(grid_.weights);
     }
     if (parent == "PointData" && !grid_.numbers_name.empty() && array == grid_.numbers_name) {
-      return ReadArray<double>(grid_.numbers);
+      return ReadAnyNumbers(grid_.numbers);
     }
     if (parent == "CellData" && array == kVtkBoundary) {
       grid_.has_tags = true;

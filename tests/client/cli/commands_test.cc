@@ -430,7 +430,38 @@ TEST_F(CommandsTest, SizesAtPointsAreReadKeptAndChecked) {
           .exit_code,
       1);
 
+  // On the vertices of a mesh of two triangles, sizes are much larger between them, unless they are interpolated.
+  const std::string field = folder_.Write(
+      "field.msh",
+      "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 -1 -1 0\n2 2 -1 0\n3 2 2 0\n4 -1 2 0\n$EndNodes\n"
+      "$Elements\n2\n1 2 2 1 1 1 2 3\n2 2 2 1 1 1 3 4\n$EndElements\n"
+      "$NodeData\n1\n\"h\"\n1\n0\n3\n0\n1\n4\n1 0.05\n2 0.05\n3 0.05\n4 0.05\n$EndNodeData\n");
+  const auto vertices = [&](const std::string& between) {
+    Mesh(kPlane, "between.vtu", {"--size-field", field, "--size-field-between", between});
+    return formats::ReadMesh(Path("between.vtu"))->View().vertex_count();
+  };
+  const uint64_t constant = [&] {
+    Mesh(kPlane, "constant.vtu", {"--size", "0.05"});
+    return formats::ReadMesh(Path("constant.vtu"))->View().vertex_count();
+  }();
+  EXPECT_LT(vertices("grow"), constant / 4);
+  EXPECT_GT(vertices("interpolate"), 0.8 * static_cast<double>(constant));
+  EXPECT_EQ(RunWellspace({"check", Path("between.vtu"), "--size-field", field, "--size-field-between", "interpolate"})
+                .exit_code,
+            0);
+  EXPECT_EQ(RunWellspace({"check", Path("between.vtu"), "--size", "0.0556"}).exit_code, 0);
+  EXPECT_THAT(MeshFails("cloud.csv", kPlane, 2, {"--size-field", sizes, "--size-field-between", "interpolate"}),
+              HasSubstr("no simplices"));
+
   // What is wrong is named by the row of the file.
+  folder_.Write("sizes.csv", "x,y,h\n0.25,0.25,0.01\n0.5,0.75,nan\nNA,0.75,0.02\n");
+  EXPECT_THAT(MeshFails("cloud.csv", kPlane, 2, options), HasSubstr(sizes + ":3: column 3: expected a finite number"));
+  std::vector<std::string> skipping = options;
+  skipping.insert(skipping.end(), {"--skip-invalid", "--stats", Path("stats.json")});
+  Mesh(kPlane, "skipped.vtu", skipping);
+  const nlohmann::json skipped = nlohmann::json::parse(folder_.Read("stats.json"));
+  EXPECT_EQ(skipped["skipped_sizes"], 2);
+  EXPECT_THAT(skipped["notes"].dump(), HasSubstr("2 sizes are left out"));
   folder_.Write("sizes.csv", "x,y,h\n0.25,0.25,0.01\n0.5,0.75,0\n");
   EXPECT_THAT(MeshFails("cloud.csv", kPlane, 2, options), HasSubstr(sizes + ":3: size 0 is not allowed"));
   EXPECT_THAT(MeshFails("cloud.csv", kPlane, 2, {"--gradation", "1.5"}), HasSubstr("--gradation: gradation: 1.5 is"));

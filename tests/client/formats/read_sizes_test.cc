@@ -4,13 +4,19 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
+#include <limits>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
 #include "tests/support/temporary_folder.h"
 
 namespace wellspace::formats {
@@ -22,13 +28,14 @@ using std::string_literals::operator""s;
 
 class ReadSizesTest : public ::testing::Test {
  protected:
-  SizedPoints Read(const std::string& name, std::string_view content, int dimension) {
-    absl::StatusOr<SizedPoints> read = ReadSizes(folder_.Write(name, content), dimension);
+  SizedPoints Read(const std::string& name, std::string_view content, int dimension, const SizeOptions& options = {}) {
+    absl::StatusOr<SizedPoints> read = ReadSizes(folder_.Write(name, content), dimension, options);
     EXPECT_TRUE(read.ok()) << read.status();
     return read.ok() ? *std::move(read) : SizedPoints();
   }
-  std::string Refusal(const std::string& name, std::string_view content, int dimension) {
-    const absl::Status status = ReadSizes(folder_.Write(name, content), dimension).status();
+  std::string Refusal(const std::string& name, std::string_view content, int dimension,
+                      const SizeOptions& options = {}) {
+    const absl::Status status = ReadSizes(folder_.Write(name, content), dimension, options).status();
     EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << content;
     return std::string(status.message());
   }
@@ -87,17 +94,6 @@ std::string Vtu(const std::string& name, const std::string& values) {
   std::string text = kVtu;
   text.replace(text.find("NAME"), 4, name);
   return text.replace(text.find("VALUES"), 6, values);
-}
-
-TEST_F(ReadSizesTest, OfAVtuItsPointData) {
-  const SizedPoints read = Read("s.vtu", Vtu("h", "0.5 0.25 2"), 2);
-  EXPECT_THAT(read.cloud.points, ElementsAre(0, 0, 1, 0, 0, 1));
-  EXPECT_THAT(read.sizes, ElementsAre(0.5, 0.25, 2));
-  EXPECT_THAT(Refusal("s.vtu", Vtu("h", "0.5 0.25 0"), 2), HasSubstr("s.vtu[2]: size 0 is not allowed"));
-  EXPECT_THAT(Refusal("s.vtu", Vtu("h", "0.5 0.25 nan"), 2), HasSubstr("s.vtu"));
-  EXPECT_THAT(Refusal("s.vtu", Vtu("h", "0.5 0.25"), 2), HasSubstr("expected a number for each of 3 points, got 2"));
-  EXPECT_THAT(Refusal("s.vtu", Vtu("g", "1 2 3"), 2), HasSubstr("no data of its points are called \"h\""));
-  EXPECT_THAT(Refusal("s.vtu", Vtu("h", "1 2 3"), 3), HasSubstr("expected points in 3-D, got 2-D"));
 }
 
 constexpr char kMsh[] =
@@ -238,6 +234,63 @@ TEST_F(ReadSizesTest, WhatIsWrongInAGeoTiffIsTold) {
   for (size_t size = 0; size + 4 < good.size(); ++size) {  // the directory is at the end; then the place of another one
     EXPECT_FALSE(ReadSizes(folder_.Write("s.tif", good.substr(0, size)), 2).ok()) << size;
   }
+}
+
+TEST_F(ReadSizesTest, WhatIsMissingIsLeftOutAndCounted) {
+  const SizeOptions skipping{.skip_invalid = true};
+  const SizedPoints read = Read("s.csv", "x,y,h\n1,2,nan\n3,4,0.5\nNA,4,1\n5,6,\n7,8,2\n", 2, skipping);
+  EXPECT_THAT(read.cloud.points, ElementsAre(3, 4, 7, 8));
+  EXPECT_THAT(read.sizes, ElementsAre(0.5, 2));
+  EXPECT_EQ(read.cloud.skipped, 3u);
+  EXPECT_THAT(read.cloud.notes, ElementsAre(HasSubstr("s.csv: 3 sizes are left out")));
+  EXPECT_EQ(read.cloud.Origin(1), folder_.Path("s.csv") + ":6");
+  EXPECT_THAT(Refusal("s.csv", "x,y,h\n1,2,-9999\n", 2, skipping), HasSubstr(":2: size -9999 is not allowed"));
+  EXPECT_THAT(Refusal("s.csv", "x,y,h\n1,2,nan\n", 2, skipping), HasSubstr("no sizes"));
+  const SizedPoints of_mesh = Read("s.vtu", Vtu("h", "1 nan 3"), 2, skipping);
+  EXPECT_THAT(of_mesh.sizes, ElementsAre(1, 3));
+  EXPECT_EQ(of_mesh.cloud.skipped, 1u);
+  EXPECT_EQ(of_mesh.cloud.Origin(1), folder_.Path("s.vtu") + "[2]");
+}
+
+TEST_F(ReadSizesTest, SizesAreInterpolatedBetweenTheVerticesOfAMesh) {
+  constexpr double kGrowth = 0.3;
+  const SizeOptions interpolating{.growth_to_interpolate = kGrowth};
+  for (const std::array<double, 3>& sizes : {std::array{0.1, 0.1, 0.1}, {0.02, 0.1, 0.3}, {5.0, 5.0, 5.0}}) {
+    const SizedPoints read =
+        Read("s.vtu", Vtu("h", absl::StrCat(sizes[0], " ", sizes[1], " ", sizes[2])), 2, interpolating);
+    const size_t count = read.sizes.size();
+    ASSERT_GE(count, 3u);
+    EXPECT_EQ(read.cloud.points.size(), 2 * count);
+    EXPECT_EQ(count == 3, sizes[0] == 5) << "more are needed only where sizes grow above them";
+    std::set<std::pair<double, double>> places;
+    for (size_t i = 0; i < count; ++i) {
+      const double x = read.cloud.points[2 * i];
+      const double y = read.cloud.points[2 * i + 1];
+      EXPECT_TRUE(places.emplace(x, y).second) << "a point is there twice";
+      EXPECT_NEAR(read.sizes[i], sizes[0] * (1 - x - y) + sizes[1] * x + sizes[2] * y, 1e-12);
+      EXPECT_THAT(read.cloud.Origin(i), HasSubstr("s.vtu["));
+    }
+    for (int k = 0; k <= 40; ++k) {
+      for (int l = 0; k + l <= 40; ++l) {
+        const double x = k / 40.0;
+        const double y = l / 40.0;
+        double least = std::numeric_limits<double>::infinity();
+        for (size_t i = 0; i < count; ++i) {
+          least = std::min(least, read.sizes[i] + kGrowth * std::hypot(x - read.cloud.points[2 * i],
+                                                                       y - read.cloud.points[2 * i + 1]));
+        }
+        EXPECT_LE(least, 1.1 * (sizes[0] * (1 - x - y) + sizes[1] * x + sizes[2] * y) + 1e-12);
+      }
+    }
+  }
+  // As lengths of edges they stand for smaller circumradii, and more are needed.
+  SizeOptions of_edges = interpolating;
+  of_edges.radius_of_size = 0.5;
+  EXPECT_GT(Read("s.vtu", Vtu("h", "0.1 0.1 0.1"), 2, of_edges).sizes.size(),
+            Read("s.vtu", Vtu("h", "0.1 0.1 0.1"), 2, interpolating).sizes.size());
+  EXPECT_THAT(Refusal("s.csv", "0,0,1\n", 2, interpolating), HasSubstr("s.csv: no simplices"));
+  EXPECT_THAT(Refusal("s.vtu", Vtu("h", "1 nan 1"), 2, interpolating), HasSubstr("s.vtu[1]: size nan"));
+  EXPECT_THAT(Refusal("s.vtu", Vtu("h", "1e-9 1e-9 1e-9"), 2, interpolating), HasSubstr("more than 10000000"));
 }
 
 }  // namespace
