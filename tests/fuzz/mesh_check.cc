@@ -52,7 +52,8 @@ void RequireValid(const core::Mesh& mesh, const core::MeshParameters& parameters
       .size_boxes = parameters.size_boxes,
       .size_samples = parameters.size_samples.get(),
       .gradation = parameters.gradation,
-      .cloud = points};
+      .cloud = points,
+      .merge_distance = parameters.merge_distance};
   const absl::Status valid = core::ValidateMesh(
       {.dimension = mesh.dimension, .points = mesh.points, .simplices = mesh.simplices, .weights = mesh.weights},
       options);

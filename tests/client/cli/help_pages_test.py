@@ -89,7 +89,8 @@ class BashTest(unittest.TestCase):
     def test_options_of_every_command(self):
         for command in leaves():
             self.assertLessEqual(options(command), set(self.complete(*command, "--")), command)
-        self.assertEqual(self.complete("mesh", "in.csv", "--size-"), ["--size-box", "--size-field", "--size-unit"])
+        self.assertEqual(self.complete("mesh", "in.csv", "--size-"),
+                         ["--size-box", "--size-field", "--size-unit", "--size-field-between"])
 
     def test_values(self):
         self.assertEqual(self.complete("mesh", "--criterion", ""), ["radius-edge", "well-spaced"])

@@ -254,6 +254,44 @@ TEST_F(RestartTest, DomainsComeBackWithTheirSegments) {
   EXPECT_EQ(MeshOf(domain), MeshOf(other));
 }
 
+TEST_F(RestartTest, DomainsComeBackWithTheirGroupsAndDistances) {
+  Start();
+  v1::CreateSessionRequest create;
+  create.mutable_parameters()->set_dimension(2);
+  create.mutable_parameters()->set_merge_distance(0.01);
+  // Two features of a map, one in the other, and a point near to a side: without groups the inner one would be a hole.
+  v1::AddSegmentsRequest request = FrameRequest("");
+  request.mutable_segments()->mutable_ends()->Truncate(16);
+  request.mutable_segments()->mutable_markers()->Truncate(8);
+  for (const uint32_t group : {3, 3, 3, 3, 8, 8, 8, 8}) {
+    request.mutable_segments()->add_groups(group);
+  }
+  request.mutable_faces()->clear_seeds();
+  request.mutable_faces()->set_faces(v1::FACE_RULE_UNION);
+  request.mutable_faces()->set_crossings(v1::CROSSING_RULE_SNAP);
+  request.mutable_faces()->set_snap_distance(0.25);
+  const std::string domain = calls().Create(create).name();
+  const std::string other = calls().Create(create).name();
+  for (const std::string& one : {domain, other}) {
+    std::vector<double> points = FramePoints();
+    points.insert(points.end(), {points[0] + (points[2] - points[0]) / 3, points[1] + 0.125});
+    calls().Upload(one, 0, points);
+    request.set_name(one);
+    calls().AddSegments({request});
+  }
+  calls().Refine(other);
+  EXPECT_EQ(calls().Get(domain).faces(), v1::FACE_RULE_UNION);
+  EXPECT_EQ(calls().Get(domain).snap_distance(), 0.25);
+  const std::string before = Seen(domain);
+  Restart();
+  EXPECT_EQ(Seen(domain), before);
+  request.set_name(domain);
+  calls().AddSegments({request});
+  EXPECT_EQ(Seen(domain), before) << "all is known, and nothing changes";
+  calls().Refine(domain);
+  EXPECT_EQ(MeshOf(domain), MeshOf(other));
+}
+
 TEST_F(RestartTest, RequestsThatWereAnsweredAreNotDoneAgain) {
   Start();
   v1::CreateSessionRequest create;
