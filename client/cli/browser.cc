@@ -29,7 +29,7 @@ bool OpenInBrowser(const std::string& path) {
   if (program.empty()) {
     return false;
   }
-  // It has its own session and no descriptors of the tool, and takes signals that the tool blocks.
+  // It has its own session and no descriptors of the tool, and takes signals that the tool blocks or ignores.
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
@@ -40,7 +40,12 @@ bool OpenInBrowser(const std::string& path) {
   sigset_t none;
   sigemptyset(&none);
   posix_spawnattr_setsigmask(&attributes, &none);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSID | POSIX_SPAWN_SETSIGMASK);
+  sigset_t ignored;
+  sigemptyset(&ignored);
+  sigaddset(&ignored, SIGPIPE);
+  sigaddset(&ignored, SIGXFSZ);
+  posix_spawnattr_setsigdefault(&attributes, &ignored);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSID | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
   std::string argument = path;
   char* arguments[] = {program.data(), argument.data(), nullptr};
   pid_t child = -1;

@@ -17,6 +17,7 @@ import {
   trianglePositions,
   visibleFaces,
   type Frame,
+  type Section,
 } from "./surface.js";
 import { TET_FACES, topologyOf, type Topology } from "./topology.js";
 
@@ -80,8 +81,8 @@ export class View {
   private readonly topology: Topology | null;
   private readonly made = new Map<string, { measure: Measure; scale: Scale }>();
   private shown: Uint8Array;
-  private kept: Uint8Array;
   private drawn: Uint32Array = new Uint32Array(0);
+  private section: Section | null = null;
   private positions: Float32Array = new Float32Array(0);
   private stale = { shown: true, surface: true, values: true, lines: true, marks: true };
   private scheduled = false;
@@ -111,7 +112,7 @@ export class View {
     this.measures = measuresOf(mesh);
     this.hiddenParts = new Uint8Array(mesh.boundary.length + 1);
     this.hiddenRegions = new Uint8Array(Math.max(1, mesh.regions.length));
-    this.shown = this.kept = new Uint8Array(this.elements);
+    this.shown = new Uint8Array(this.elements);
     this.topology = d === 3 ? topologyOf(mesh) : null;
     this.isBox = d === 3 && mesh.boundary.length > 0 && mesh.boundary.every((part) => BOX_NAMES.includes(part.name));
     this.cut.on = this.isBox;
@@ -167,7 +168,7 @@ export class View {
     return sizes;
   }
 
-  // What has changed, from which the rest follows.
+  /** Tells what has changed; all that follows from it is drawn with the next frame. */
   change(what: "shown" | "surface" | "values" | "lines" | "marks" | "camera"): void {
     const s = this.stale;
     if (what === "shown") s.shown = s.surface = s.values = true;
@@ -297,9 +298,9 @@ export class View {
     }
     const plane = this.plane();
     const heights = this.cut.on ? heightsOver(mesh, plane) : null;
-    this.kept = heights && !this.isFlat ? keptBelow(mesh, this.shown, heights) : this.shown;
-    const seen = visibleFaces(topology, this.kept, this.hiddenParts);
-    this.drawn = this.size < 1 ? shrunkFaces(topology, this.kept, seen) : seen;
+    const kept = heights && !this.isFlat ? keptBelow(mesh, this.shown, heights) : this.shown;
+    const seen = visibleFaces(topology, kept, this.hiddenParts);
+    this.drawn = this.size < 1 ? shrunkFaces(topology, kept, seen) : seen;
     this.positions = facePositions(mesh, this.drawn, frame, this.size);
     this.picture.setSurface(this.positions, this.surfaceValues());
     this.stale.values = false;
@@ -308,8 +309,10 @@ export class View {
       const [x, y, z] = plane.normal;
       this.picture.setClip(plane.normal, (plane.offset - x * origin[0] - y * origin[1] - z * origin[2]) * scale);
       const section = sectionOf(mesh, this.shown, heights, frame);
+      this.section = section;
       this.picture.setSection(section.positions, this.sectionValues(section), section.inner);
     } else {
+      this.section = null;
       this.picture.setClip(null, 0);
       this.picture.setSection(new Float32Array(0), new Float32Array(0), new Uint8Array(0));
     }
@@ -345,7 +348,7 @@ export class View {
     return values;
   }
 
-  private sectionValues(section: ReturnType<typeof sectionOf>): Float32Array {
+  private sectionValues(section: Section): Float32Array {
     const values = new Float32Array(3 * section.elements.length);
     const coloured = this.coloured;
     const smooth = coloured?.measure.ofVertices;
@@ -421,6 +424,12 @@ export class View {
       return plane.normal[0] * px + plane.normal[1] * py + plane.normal[2] * pz <= plane.offset;
     };
     const found = pick(this.positions, from, direction, this.isFlat ? keeps : () => true);
+    if (this.section) {
+      const inside = pick(this.section.positions, from, direction, () => true);
+      if (inside.distance < found.distance) {
+        return { element: this.section.elements[inside.triangle], part: 0, facet: [] };
+      }
+    }
     if (found.triangle < 0) return null;
     const drawn = this.drawn[found.triangle];
     if (!this.topology) {

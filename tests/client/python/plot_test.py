@@ -7,12 +7,13 @@ import re
 import subprocess
 import tempfile
 import unittest
+from unittest import mock
 
 import numpy as np
 from support import PATIENCE, TOOL, Case, spot, uniform
 
 import wellspace
-from wellspace import InvalidArgumentError
+from wellspace import InvalidArgumentError, LimitError
 
 HOSTILE = "</script><script>alert(1)</script><!-- \udc80 é \x7f\n\"'&"
 
@@ -95,6 +96,8 @@ class PlotTest(Case):
             self.assertEqual(caught.exception.field, field)
         with self.assertRaisesRegex(InvalidArgumentError, "4-D"):
             wellspace.mesh(uniform(9, 4)).plot()
+        with mock.patch("wellspace._view._MOST_BYTES", 500), self.assertRaisesRegex(LimitError, "the points take"):
+            mesh.plot()
 
 
 if __name__ == "__main__":

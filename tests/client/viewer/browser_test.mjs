@@ -121,6 +121,11 @@ test("a mesh of tetrahedra: boundary, cut, shrink, colours", async () => {
     const flat = await picture(page);
     assert.notEqual(flat.digest, less.digest);
     assert.ok(flat.covered > 0.1, JSON.stringify(flat));
+    // Inside, where a facet of the box cannot be.
+    await page.locator("#canvas").click();
+    await page.waitForSelector("#chosen-section:not([hidden])");
+    assert.doesNotMatch(await text(page, "#chosen"), /Facet/);
+    await page.click("#forget");
     await page.locator("#shrink").fill("40");
     const shrunk = await picture(page);
     assert.notEqual(shrunk.digest, flat.digest);
