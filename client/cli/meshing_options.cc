@@ -16,7 +16,8 @@ namespace wellspace::cli {
 const char kCloudsHelp[] =
     "Clouds:  .csv .tsv .txt .dat (columns separated by commas, semicolons or blanks; a header may name x, y, z, or\n"
     "         lon, lat and the like), .xyz, .asc, .pts, .node, .npy, .pcd, .las, vertices of .ply, .obj, .off, .stl,\n"
-    "         .vtk, .vtp, .vts, .vtu, .msh, .mesh, .14, .2dm and .npz; each but .npz may be compressed (.csv.gz); \"-\" is\n"
+    "         .vtk, .vtp, .vts, .vtu, .msh, .mesh, .14, .2dm and .npz; each but .npz may be compressed (.csv.gz); "
+    "\"-\" is\n"
     "         standard input (csv, or --input-format)\n"
     "Domains: in 2-D, .poly (Triangle's, with .node), .geojson, .geojsonl, .ndjson, .wkt and .shp; with --segments\n"
     "         lines of .obj, polylines of .csv and boundaries of .14 (ADCIRC)\n";

@@ -317,7 +317,7 @@ TEST(DomainFeasibility, WhatLiesInABoxIsMeasured) {
   const DomainInput input = Angle();
   RunContext context;
   const absl::StatusOr<DomainCloud> made =
-      MakeDomainCloud(input.points, input.features(), {{0, 0}, {1, 1}}, 1'000'000, 1, context);
+      MakeDomainCloud(input.points, input.features(), {{0, 0}, {1, 1}}, 0, 1'000'000, 1, context);
   ASSERT_TRUE(made.ok()) << made.status();
   const DomainShape shape(*made->planar);
   const double unit = made->domain.scale * made->domain.scale;

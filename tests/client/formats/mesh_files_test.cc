@@ -274,8 +274,9 @@ TEST_F(MeshFilesTest, VtuErrors) {
   };
   EXPECT_THAT(message("UnstructuredGrid\"", "PolyData\""), HasSubstr("mesh.vtu:3: expected <VTKFile type="));
   EXPECT_THAT(message("LittleEndian", "Middle"), HasSubstr("mesh.vtu:3: expected byte_order"));
-  EXPECT_THAT(message("byte_order=", "compressor=\"vtkLZ4DataCompressor\" byte_order="),
-              HasSubstr("mesh.vtu:3: expected compressor vtkZLibDataCompressor or none, got \"vtkLZ4DataCompressor\""));
+  EXPECT_THAT(message("byte_order=", "compressor=\"vtkZstdDataCompressor\" byte_order="),
+              HasSubstr("mesh.vtu:3: expected compressor vtkZLibDataCompressor, vtkLZ4DataCompressor, "
+                        "vtkLZMADataCompressor or none, got \"vtkZstdDataCompressor\""));
   EXPECT_THAT(message("byte_order=", "header_type=\"Int8\" byte_order="),
               HasSubstr("mesh.vtu:3: expected header_type"));
   EXPECT_THAT(message("NumberOfPoints=\"3\"", "NumberOfPoints=\"-3\""),

@@ -94,7 +94,7 @@ TEST(DomainEstimateTest, RandomSegments) {
 
 uint64_t ComparedIn(const DomainInput& input) {
   RunContext context;
-  absl::StatusOr<DomainCloud> made = MakeDomainCloud(input.points, input.features(), {}, 1'000'000, 1, context);
+  absl::StatusOr<DomainCloud> made = MakeDomainCloud(input.points, input.features(), {}, 0, 1'000'000, 1, context);
   EXPECT_TRUE(made.ok()) << made.status();
   QueryStructure<2> structure;
   const absl::Status built = structure.Initialize(made->cloud.grid, std::move(made->cloud.points), ~uint64_t{0}, 1,

@@ -284,10 +284,12 @@ TEST_F(ReadPolyTest, OptionsOfOtherFormatsAreRefused) {
               HasSubstr("--marker-property is of the format geojson"));
   EXPECT_THAT(ReadBad("a.poly", kAll, {.columns = {"1", "2"}}), HasSubstr("--columns is of the format csv"));
   EXPECT_THAT(ReadBad("a.poly", kAll, {.id_column = "1"}), HasSubstr("--id-column is of the format csv"));
-  EXPECT_THAT(ReadBad("a.shp", kAll), HasSubstr("expected one of .poly, .geojson, .json, .obj, .csv"));
-  EXPECT_EQ(ReadGood("a.shp", kAll, {.format = "poly"}).point_count(), 4u);
+  EXPECT_THAT(ReadBad("a.dxf", kAll), HasSubstr("expected one of .poly, .geojson, .json, .geojsonl, "));
+  EXPECT_EQ(ReadGood("a.dxf", kAll, {.format = "poly"}).point_count(), 4u);
   EXPECT_TRUE(IsDomainPath("a/b.poly.gz") && IsDomainPath("c.GeoJSON"));
-  EXPECT_FALSE(IsDomainPath("a.csv") || IsDomainPath("a.obj.gz") || IsDomainPath("poly"));
+  EXPECT_TRUE(IsDomainPath("a.wkt") && IsDomainPath("a.shp.gz") && IsDomainPath("a.ndjson"));
+  EXPECT_FALSE(IsDomainPath("a.csv") || IsDomainPath("a.json") || IsDomainPath("fort.14") || IsDomainPath("a.obj.gz") ||
+               IsDomainPath("poly"));
 }
 
 }  // namespace

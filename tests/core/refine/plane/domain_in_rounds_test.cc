@@ -115,7 +115,7 @@ struct Refined {
   Refined(const Input& input, double rho, double size, int threads) {
     RunContext context;
     absl::StatusOr<DomainCloud> made =
-        MakeDomainCloud(input.points, input.features(), {{-0.1, -0.1}, {1.1, 1.1}}, 1'000'000, 1, context);
+        MakeDomainCloud(input.points, input.features(), {{-0.1, -0.1}, {1.1, 1.1}}, 0, 1'000'000, 1, context);
     EXPECT_TRUE(made.ok()) << made.status();
     planar = std::move(made->planar);
     EXPECT_TRUE(

@@ -32,7 +32,8 @@ struct SmallDomain {
     features.ends = std::move(ends);
     features.faces = faces;
     const core::RunContext context;
-    absl::StatusOr<core::DomainCloud> made = core::MakeDomainCloud(coordinates, features, box, 1'000'000, 1, context);
+    absl::StatusOr<core::DomainCloud> made =
+        core::MakeDomainCloud(coordinates, features, box, 0, 1'000'000, 1, context);
     EXPECT_TRUE(made.ok()) << made.status();
     EXPECT_EQ(made->domain.scale, 1);
     planar = std::move(made->planar);
