@@ -37,9 +37,9 @@ CLI::Option* SizeFieldOptions::AddTo(CLI::App& command) {
       command
           .add_option("--size-field", path_,
                       "File of points with a size each, from which sizes grow by --gradation: .csv and the like with "
-                       "columns x, y, (z,) h; or .vtu, .msh, .npz with h at their points; or in 2-D a raster, .asc "
-                       "(ESRI) or .tif (GeoTIFF), of sizes at the centres of its cells. A size holds at its point, "
-                       "wherever that is, and grows from there")
+                      "columns x, y, (z,) h; or .vtu, .msh, .npz with h at their points; or in 2-D a raster, .asc "
+                      "(ESRI) or .tif (GeoTIFF), of sizes at the centres of its cells. A size holds at its point, "
+                      "wherever that is, and grows from there")
           ->type_name("FILE");
   command
       .add_option_function<std::string>(
