@@ -121,7 +121,7 @@ class IdleSessionsTest : public ::testing::Test {
     core::RunContext context;
     std::optional<SessionWork> work = session.BeginWork(operation);
     ASSERT_TRUE(work.has_value());
-    work->mesher = script_(operation.parameters(), {}, nullptr, context).value();
+    work->mesher = script_(operation.parameters(), {}, context).value();
     work->memory = memory_.Reserve(kStructure, "a structure").value();
     work->memory.MakeLasting(session.MesherLasts());
     WorkResult result{.status = absl::OkStatus(),

@@ -59,7 +59,7 @@ class RestoredSessionTest : public ::testing::Test {
     core::RunContext context;
     std::optional<SessionWork> work = session_->BeginWork(*operation);
     ASSERT_TRUE(work.has_value());
-    work->mesher = script_(operation->parameters(), {}, nullptr, context).value();
+    work->mesher = script_(operation->parameters(), {}, context).value();
     WorkResult result{.status = absl::OkStatus(),
                       .work = *std::move(work),
                       .mesh = session_->KeepMesh(MakeMesh({.dimension = 2}), context).value()};
