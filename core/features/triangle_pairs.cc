@@ -12,6 +12,7 @@
 #include "core/base/cancellable_sort.h"
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
+#include "core/features/box_misses.h"
 #include "core/geometry/box.h"
 #include "core/geometry/vector_product.h"
 
@@ -27,9 +28,6 @@ constexpr size_t kMostOfPart = size_t{1} << 10;
 constexpr double kGoodCut = 0.8;
 // Comparisons between two looks at the context.
 constexpr size_t kComparedBetweenChecks = size_t{1} << 12;
-
-// What is rounded of coordinates in a box, and much more.
-constexpr double kRoom = 0x1p-45;
 
 // Triangles in a part of space.
 struct Group {
@@ -359,57 +357,11 @@ class PairFinder {
     return box;
   }
   double RoomAt(const Box<3>& box, int axis) const {
-    return least_ + kRoom * (std::abs(box.low[axis]) + std::abs(box.high[axis]));
+    return least_ + kBoxRoom * (std::abs(box.low[axis]) + std::abs(box.high[axis]));
   }
 
-  // Whether a segment surely has no point in a box.
-  static bool SideMisses(const Point<3>& a, const Point<3>& b, const Box<3>& box) {
-    double from = 0;
-    double to = 1;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double along = b[axis] - a[axis];
-      if (along == 0) {
-        if (a[axis] < box.low[axis] || a[axis] > box.high[axis]) {
-          return true;
-        }
-        continue;
-      }
-      const double at_low = (box.low[axis] - a[axis]) / along;
-      const double at_high = (box.high[axis] - a[axis]) / along;
-      from = std::max(from, std::min(at_low, at_high));
-      to = std::min(to, std::max(at_low, at_high));
-    }
-    return from > to + 0x1p-40 * (1 + std::abs(from) + std::abs(to));
-  }
-
-  // Whether a triangle surely has no point in a box: the box lies on one side of its plane, or of a plane along one of
-  // its sides and across it.
   bool Misses(uint32_t triangle, const Box<3>& box) const {
-    const Point<3>& a = At(triangle, 0);
-    const Point<3> normal = Cross(Difference<3>(At(triangle, 1), a), Difference<3>(At(triangle, 2), a));
-    const auto is_beyond = [&](const Point<3>& out, const Point<3>& from, bool both_ways) {
-      double middle = 0;
-      double half = 0;
-      double magnitude = 0;
-      for (int axis = 0; axis < 3; ++axis) {
-        const double centre = 0.5 * (box.low[axis] + box.high[axis]) - from[axis];
-        middle += out[axis] * centre;
-        half += std::abs(out[axis]) * 0.5 * (box.high[axis] - box.low[axis]);
-        magnitude += std::abs(out[axis]) * (std::abs(centre) + std::abs(from[axis]));
-      }
-      const double room = half + kRoom * (magnitude + half);
-      return middle > room || (both_ways && -middle > room);
-    };
-    if (is_beyond(normal, a, /*both_ways=*/true)) {
-      return true;
-    }
-    for (size_t k = 0; k < 3; ++k) {
-      const Point<3> side = Difference<3>(At(triangle, (k + 1) % 3), At(triangle, k));
-      if (is_beyond(Cross(side, normal), At(triangle, k), /*both_ways=*/false)) {
-        return true;
-      }
-    }
-    return false;
+    return TriangleMisses({At(triangle, 0), At(triangle, 1), At(triangle, 2)}, box);
   }
 
   // Cuts a group into two that together hold all that it can have; false where no cut is good.
@@ -596,7 +548,7 @@ class PairFinder {
       }
       const uint32_t t = group.triangles[i];
       const auto [low, high] = ReachAlong(t, plane.normal);
-      const double room = least_ + kRoom * (size + std::abs(low) + std::abs(high));
+      const double room = least_ + kBoxRoom * (size + std::abs(low) + std::abs(high));
       if (low <= plane.offset + room) {
         halves[0].triangles.push_back(t);
       }
