@@ -57,6 +57,18 @@ class CheckTextTest(unittest.TestCase):
         listed = {"core/a.cc": function("Long", 61), "scripts/long_functions.txt": "core/a.cc Long\n"}
         self.assertEqual(self.run_with(listed)[0], 0)
 
+    def test_long_file(self):
+        self.assert_found({"core/a.cc": "int x;\n" * 601}, "core/a.cc:600: ", "601 lines; at most 600")
+        self.assertEqual(self.run_with({"core/a.cc": "int x;\n" * 600, "client/a.cc": "int x;\n" * 601})[0], 0)
+        self.assert_found({"README.md": "a\n" * 131}, "README.md:130: ", "131 lines; at most 130")
+
+    def test_large_class(self):
+        members = "".join(f"  std::vector<int> name{i}_;\n  bool flag{i}_ = false;\n" for i in range(15))
+        text = "class Large final : public Base {\n public:\n  int Count() const { return count_; }\n\n private:\n"
+        self.assert_found({"core/a.h": text + members + "  int last_ GUARDED;\n  int count_{0};\n};\n"}, "core/a.h:1: ",
+                          "Large has 31 members; at most 30")
+        self.assertEqual(self.run_with({"core/a.h": text + members + "};\nstruct B {\n  int last_;\n};\n"})[0], 0)
+
     def test_listed_function_that_is_no_longer_long(self):
         listed = {"core/a.cc": function("Long", 60), "scripts/long_functions.txt": "core/a.cc Long\n"}
         self.assert_found(listed, "scripts/long_functions.txt:1: ", "core/a.cc Long")

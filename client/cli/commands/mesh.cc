@@ -72,7 +72,8 @@ absl::Status MeshCommand::Mesh(client::Client& client, const client::MeshOptions
     }
   }
   std::vector<std::string> notes = options.NotesOf(file.header().statistics.domain);
-  notes.insert(notes.end(), file.notes().begin(), file.notes().end());
+  const std::vector<std::string> of_file = file.notes();
+  notes.insert(notes.end(), of_file.begin(), of_file.end());
   WELLSPACE_RETURN_IF_ERROR(options.WriteStatistics(StatisticsJson(file.header(), file.input_vertex()), notes));
   PrintNotes({.notes = notes}, options.remote().format(), options.remote().quiet());
   if (!options.remote().quiet()) {
