@@ -1,6 +1,9 @@
 # Warnings, sanitizers and the shape of every target of the project.
 
 add_library(wellspace_options INTERFACE)
+# clang alone knows which lock guards what (GUARDED_BY).
+target_compile_options(wellspace_options INTERFACE $<$<CXX_COMPILER_ID:Clang>:-Wthread-safety>
+                       $<$<CXX_COMPILER_ID:Clang>:-Werror=thread-safety>)
 target_compile_options(wellspace_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor)
 target_include_directories(wellspace_options INTERFACE ${PROJECT_SOURCE_DIR})
 option(WELLSPACE_WERROR "Treat warnings as errors; off in a subproject" ${PROJECT_IS_TOP_LEVEL})

@@ -117,7 +117,7 @@ absl::StatusOr<core::MeshParameters> ParametersForSession(const v1::MeshParamete
                                                           const ServiceOptions& options, const Session& session) {
   WELLSPACE_ASSIGN_OR_RETURN(core::MeshParameters parameters, ParametersFromProto(message, options));
   WELLSPACE_RETURN_IF_ERROR(CheckParametersSize(parameters));
-  const core::MeshParameters known = session.parameters();
+  const core::MeshParameters known = *session.state()->parameters;
   if (parameters.dimension != known.dimension) {
     return MakeError(v1::ERROR_REASON_INVALID_PARAMETERS,
                      absl::StrCat("dimension is ", parameters.dimension, ", but that of the session is ",

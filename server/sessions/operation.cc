@@ -16,12 +16,6 @@ constexpr uint32_t kMostCrashes = 3;
 // Room for the numbers of the events of one process.
 constexpr int kAttemptShift = 32;
 
-absl::Time TimeOf(int64_t nanoseconds) {
-  return nanoseconds == 0 ? absl::InfiniteFuture() : absl::FromUnixNanos(nanoseconds);
-}
-
-int64_t NanosecondsOf(absl::Time time) { return time == absl::InfiniteFuture() ? 0 : absl::ToUnixNanos(time); }
-
 bool IsEnd(v1::Operation::State state) {
   return state != v1::Operation::STATE_QUEUED && state != v1::Operation::STATE_RUNNING;
 }
@@ -32,88 +26,74 @@ v1::Operation::State EndOf(const absl::Status& status) {
 
 }  // namespace
 
-Operation::Operation(std::string name, const store::v1::OperationRecord& record, core::MeshParameters parameters)
+Operation::Operation(std::string name, std::shared_ptr<const store::v1::OperationRecord> record,
+                     core::MeshParameters parameters)
     : name_(std::move(name)),
-      number_(record.number()),
       parameters_(std::move(parameters)),
-      restart_(record.restart()),
-      create_time_(absl::FromUnixNanos(record.create_time_ns())),
-      attempts_(record.attempts() + (IsEnd(record.state()) ? 0 : 1)),
-      crashes_(record.crashes() + (record.state() == v1::Operation::STATE_RUNNING ? 1 : 0)),
-      state_(IsEnd(record.state()) ? record.state() : v1::Operation::STATE_QUEUED),
-      end_time_(TimeOf(record.end_time_ns())),
-      is_cancelled_(record.is_cancelled()),
-      mesh_revision_(record.mesh_revision()),
-      error_(record.error()),
-      pacer_(uint64_t{attempts_ - 1} << kAttemptShift) {
-  if (IsEnd(state_)) {
-    start_time_ = TimeOf(record.start_time_ns());
-    if (record.has_progress()) {
-      events_.push_back(record.progress());
-    }
+      number_(record->number()),
+      restart_(record->restart()),
+      crashes_(record->crashes()),
+      record_(std::move(record)),
+      pacer_(uint64_t{record_->attempts() - 1} << kAttemptShift) {
+  if (record_->has_progress()) {
+    events_.push_back(record_->progress());
   }
+}
+
+std::shared_ptr<const store::v1::OperationRecord> Operation::Resumed(
+    std::shared_ptr<const store::v1::OperationRecord> record) {
+  if (IsEnd(record->state())) {
+    return record;
+  }
+  auto resumed = std::make_shared<store::v1::OperationRecord>(*record);
+  resumed->set_attempts(record->attempts() + 1);
+  resumed->set_crashes(record->crashes() + (record->state() == v1::Operation::STATE_RUNNING ? 1 : 0));
+  resumed->set_state(v1::Operation::STATE_QUEUED);
+  resumed->set_start_time_ns(0);
+  return resumed;
 }
 
 v1::Operation Operation::Describe() const {
   v1::Operation message;
   message.set_name(name_);
-  *message.mutable_parameters() = ParametersToProto(parameters_);
-  *message.mutable_create_time() = TimeToProto(create_time_);
   std::lock_guard lock(mutex_);
-  message.set_state(state_);
+  *message.mutable_parameters() = record_->parameters();
+  *message.mutable_create_time() = TimeToProto(absl::FromUnixNanos(record_->create_time_ns()));
+  message.set_state(record_->state());
   if (!events_.empty()) {
     *message.mutable_progress() = events_.back();
   }
-  if (error_.code() != 0) {
-    *message.mutable_error() = error_;
+  if (record_->has_error()) {
+    *message.mutable_error() = record_->error();
   }
-  if (start_time_ != absl::InfiniteFuture()) {
-    *message.mutable_start_time() = TimeToProto(start_time_);
+  if (record_->start_time_ns() != 0) {
+    *message.mutable_start_time() = TimeToProto(absl::FromUnixNanos(record_->start_time_ns()));
   }
-  if (HasEndedLocked()) {
-    *message.mutable_end_time() = TimeToProto(end_time_);
+  if (record_->end_time_ns() != 0) {
+    *message.mutable_end_time() = TimeToProto(absl::FromUnixNanos(record_->end_time_ns()));
   }
-  message.set_mesh_revision(mesh_revision_);
+  message.set_mesh_revision(record_->mesh_revision());
   message.set_restart(restart_);
   return message;
 }
 
 bool Operation::IsQueued() const {
   std::lock_guard lock(mutex_);
-  return state_ == v1::Operation::STATE_QUEUED;
+  return record_->state() == v1::Operation::STATE_QUEUED;
 }
 
 bool Operation::IsCancelled() const {
   std::lock_guard lock(mutex_);
-  return is_cancelled_;
+  return record_->is_cancelled();
 }
 
 bool Operation::IsSuspect() const { return crashes_ > 0; }
 
 bool Operation::RunsAlone() const { return crashes_ + 1 >= kMostCrashes; }
 
-store::v1::OperationRecord Operation::RecordLocked() const {
-  store::v1::OperationRecord record;
-  record.set_number(number_);
-  *record.mutable_parameters() = ParametersToProto(parameters_);
-  record.set_state(state_);
-  record.set_create_time_ns(absl::ToUnixNanos(create_time_));
-  record.set_start_time_ns(NanosecondsOf(start_time_));
-  record.set_end_time_ns(NanosecondsOf(end_time_));
-  record.set_attempts(attempts_);
-  record.set_crashes(crashes_);
-  record.set_is_cancelled(is_cancelled_);
-  if (error_.code() != 0) {
-    *record.mutable_error() = error_;
-  }
-  record.set_mesh_revision(mesh_revision_);
-  record.set_restart(restart_);
-  return record;
-}
-
 store::v1::OperationRecord Operation::Record() const {
   std::lock_guard lock(mutex_);
-  return RecordLocked();
+  return *record_;
 }
 
 store::v1::OperationRecord Operation::RecordOfStart(absl::Time now) const {
@@ -126,7 +106,7 @@ store::v1::OperationRecord Operation::RecordOfStart(absl::Time now) const {
 store::v1::OperationRecord Operation::RecordOfSuccess(absl::Time now, uint64_t mesh_revision, uint64_t vertices,
                                                       uint64_t simplices) const {
   std::lock_guard lock(mutex_);
-  store::v1::OperationRecord record = RecordLocked();
+  store::v1::OperationRecord record = *record_;
   record.set_state(v1::Operation::STATE_SUCCEEDED);
   record.set_end_time_ns(absl::ToUnixNanos(now));
   record.set_mesh_revision(mesh_revision);
@@ -136,7 +116,7 @@ store::v1::OperationRecord Operation::RecordOfSuccess(absl::Time now, uint64_t m
   ProgressPacer pacer = pacer_;  // the operation has not ended yet
   *record.mutable_progress() = pacer.Final(progress);
   // Events may come before the end. A watcher of the next process is to hear this one, whatever it has heard.
-  record.mutable_progress()->set_sequence((uint64_t{attempts_} << kAttemptShift) - 1);
+  record.mutable_progress()->set_sequence((uint64_t{record.attempts()} << kAttemptShift) - 1);
   return record;
 }
 
@@ -145,6 +125,12 @@ store::v1::OperationRecord Operation::RecordOfFailure(absl::Time now, const absl
   record.set_state(EndOf(status));
   record.set_end_time_ns(absl::ToUnixNanos(now));
   *record.mutable_error() = StatusToProto(status);
+  return record;
+}
+
+store::v1::OperationRecord Operation::RecordOfCancel() const {
+  store::v1::OperationRecord record = Record();
+  record.set_is_cancelled(true);
   return record;
 }
 
@@ -168,14 +154,9 @@ absl::Status Operation::RefusalToResume() const {
   return absl::OkStatus();
 }
 
-void Operation::NoteCancel() {
-  std::lock_guard lock(mutex_);
-  is_cancelled_ = true;
-}
-
 bool Operation::HasEnded() const {
   std::lock_guard lock(mutex_);
-  return HasEndedLocked();
+  return IsEnd(record_->state());
 }
 
 std::optional<v1::ProgressEvent> Operation::EventAfter(std::optional<uint64_t> after) const {
@@ -202,7 +183,7 @@ void Operation::Unwatch(uint64_t watch) {
 
 bool Operation::SetJob(std::shared_ptr<Job> job) {
   std::lock_guard lock(mutex_);
-  if (HasEndedLocked()) {
+  if (IsEnd(record_->state())) {
     return false;
   }
   job_ = std::move(job);
@@ -217,7 +198,7 @@ std::shared_ptr<Job> Operation::job() const {
 bool Operation::Tick(absl::Duration now) {
   {
     std::lock_guard lock(mutex_);
-    if (HasEndedLocked()) {
+    if (IsEnd(record_->state())) {
       return false;
     }
     std::optional<v1::ProgressEvent> event = pacer_.Next(Snapshot(), now);
@@ -230,30 +211,24 @@ bool Operation::Tick(absl::Duration now) {
   return true;
 }
 
-void Operation::Start(absl::Time now) {
+std::shared_ptr<Job> Operation::Apply(std::shared_ptr<const store::v1::OperationRecord> record) {
   std::lock_guard lock(mutex_);
-  state_ = v1::Operation::STATE_RUNNING;
-  start_time_ = now;
-}
-
-void Operation::Succeed(absl::Time now, uint64_t mesh_revision, uint64_t vertices, uint64_t simplices) {
-  std::lock_guard lock(mutex_);
-  core::Progress progress = Snapshot();
-  progress.vertices = vertices;
-  progress.simplices = simplices;
-  Keep(pacer_.Final(progress));
-  mesh_revision_ = mesh_revision;
-  End(v1::Operation::STATE_SUCCEEDED, now);
-}
-
-std::shared_ptr<Job> Operation::Fail(absl::Time now, const absl::Status& status) {
-  std::lock_guard lock(mutex_);
-  error_ = StatusToProto(status);
-  return End(EndOf(status), now);
+  record_ = std::move(record);
+  if (!IsEnd(record_->state())) {
+    return nullptr;
+  }
+  if (record_->has_progress()) {
+    Keep(pacer_.Final(record_->progress()));
+  }
+  while (events_.size() > kEventsOfEnded) {
+    events_.pop_front();
+  }
+  return std::exchange(job_, nullptr);
 }
 
 core::Progress Operation::Snapshot() const {
-  return job_ == nullptr || state_ == v1::Operation::STATE_QUEUED ? core::Progress() : job_->context().Snapshot();
+  return job_ == nullptr || record_->state() == v1::Operation::STATE_QUEUED ? core::Progress()
+                                                                            : job_->context().Snapshot();
 }
 
 void Operation::Keep(v1::ProgressEvent event) {
@@ -261,15 +236,6 @@ void Operation::Keep(v1::ProgressEvent event) {
   if (events_.size() > kKeptEvents) {
     events_.pop_front();
   }
-}
-
-std::shared_ptr<Job> Operation::End(v1::Operation::State state, absl::Time now) {
-  state_ = state;
-  end_time_ = now;
-  while (events_.size() > kEventsOfEnded) {
-    events_.pop_front();
-  }
-  return std::exchange(job_, nullptr);
 }
 
 void Operation::Notify() const {

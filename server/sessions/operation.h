@@ -35,16 +35,13 @@ class Operation {
   static constexpr size_t kKeptEvents = 32;
   static constexpr size_t kEventsOfEnded = 8;
 
-  // `name` is "sessions/{session}/operations/{number}".
-  // `restart`: it makes the structure anew.
-  Operation(std::string name, uint64_t number, core::MeshParameters parameters, bool restart, absl::Time create_time)
-      : name_(std::move(name)),
-        number_(number),
-        parameters_(std::move(parameters)),
-        restart_(restart),
-        create_time_(create_time) {}
-  // One that was written down as `record`. One that had not ended waits for a worker again.
-  Operation(std::string name, const store::v1::OperationRecord& record, core::MeshParameters parameters);
+  // `name` is "sessions/{session}/operations/{number}"; `record` is that of NewOperation, or of Resumed; `parameters`
+  // are its own, as the core takes them.
+  Operation(std::string name, std::shared_ptr<const store::v1::OperationRecord> record,
+            core::MeshParameters parameters);
+  // What was written down as `record`, as the next process has it. One that had not ended waits for a worker again.
+  static std::shared_ptr<const store::v1::OperationRecord> Resumed(
+      std::shared_ptr<const store::v1::OperationRecord> record);
 
   const std::string& name() const { return name_; }
   uint64_t number() const { return number_; }
@@ -78,13 +75,16 @@ class Operation {
   // ProgressPacer::kMinInterval; `now` is a time since boot.
   bool Tick(absl::Duration now);
 
-  // What is written down of it: as it is now, or as it will be after Start, Succeed or Fail.
+  // What is written down of it: as it is now, or as it is once Apply has taken it.
   store::v1::OperationRecord Record() const;
   store::v1::OperationRecord RecordOfStart(absl::Time now) const;
+  // The figures are those of the new mesh.
   store::v1::OperationRecord RecordOfSuccess(absl::Time now, uint64_t mesh_revision, uint64_t vertices,
                                              uint64_t simplices) const;
+  // CANCELLED if that is the code of `status`, else FAILED.
   store::v1::OperationRecord RecordOfFailure(absl::Time now, const absl::Status& status) const;
-
+  // A client has asked for its end.
+  store::v1::OperationRecord RecordOfCancel() const;
   // It is left to the next process, which counts no death of this one.
   store::v1::OperationRecord RecordOfParking() const;
 
@@ -93,41 +93,26 @@ class Operation {
   // Errors:     CANCELLED: a client has asked for its end; WORK_CRASHED.
   absl::Status RefusalToResume() const;
 
-  // For its session, which starts it at most once, and ends it once. After its end Notify is to be called, without any
-  // lock.
-  void NoteCancel();
-  void Start(absl::Time now);
-  // The figures are those of the new mesh.
-  void Succeed(absl::Time now, uint64_t mesh_revision, uint64_t vertices, uint64_t simplices);
-  // CANCELLED if that is the code of `status`, else FAILED. Returns the job that it had, if any.
-  std::shared_ptr<Job> Fail(absl::Time now, const absl::Status& status);
+  // For its session, which starts it at most once, and ends it once: from now on it is as `record` says, which one of
+  // the functions above has made, and is written down. Where that ends it, returns the job that it had, if any; Notify
+  // is to be called then, without any lock.
+  std::shared_ptr<Job> Apply(std::shared_ptr<const store::v1::OperationRecord> record);
   void Notify() const;
 
  private:
   // The following want mutex_ to be held.
   core::Progress Snapshot() const;
-  store::v1::OperationRecord RecordLocked() const;
   void Keep(v1::ProgressEvent event);
-  // Returns the job that it had.
-  std::shared_ptr<Job> End(v1::Operation::State state, absl::Time now);
-  bool HasEndedLocked() const { return end_time_ != absl::InfiniteFuture(); }
 
   const std::string name_;
-  const uint64_t number_;
   const core::MeshParameters parameters_;
+  const uint64_t number_;
   const bool restart_;
-  const absl::Time create_time_;
-  const uint32_t attempts_ = 1;  // processes that have had it
-  const uint32_t crashes_ = 0;   // of these, those that died in its work before this one
+  const uint32_t crashes_;  // of the processes that have had it, those that died in its work before this one
 
   mutable std::mutex mutex_;
   // Guarded by mutex_.
-  v1::Operation::State state_ = v1::Operation::STATE_QUEUED;
-  absl::Time start_time_ = absl::InfiniteFuture();
-  absl::Time end_time_ = absl::InfiniteFuture();
-  bool is_cancelled_ = false;
-  uint64_t mesh_revision_ = 0;
-  google::rpc::Status error_;
+  std::shared_ptr<const store::v1::OperationRecord> record_;
   std::shared_ptr<Job> job_;
   ProgressPacer pacer_;
   std::deque<v1::ProgressEvent> events_;

@@ -1,6 +1,7 @@
 #include "server/sessions/progress_pacer.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "server/wire/convert.h"
 
@@ -28,6 +29,12 @@ v1::ProgressEvent ProgressPacer::Final(const core::Progress& progress) {
   v1::ProgressEvent event = Advance(progress);
   event.set_phase(v1::PHASE_DONE);
   event.set_fraction(1);
+  return Final(std::move(event));
+}
+
+v1::ProgressEvent ProgressPacer::Final(v1::ProgressEvent event) {
+  event.set_vertices(std::max(event.vertices(), last_.vertices()));
+  event.set_simplices(std::max(event.simplices(), last_.simplices()));
   event.set_sequence(next_sequence_++);
   last_ = event;
   return event;

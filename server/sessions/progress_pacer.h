@@ -28,6 +28,8 @@ class ProgressPacer {
 
   // The last event of a run that succeeded.
   v1::ProgressEvent Final(const core::Progress& progress);
+  // The same of an event that Final of a copy of this has made before others came in between.
+  v1::ProgressEvent Final(v1::ProgressEvent event);
 
  private:
   // The event for `progress`, never behind the one before.

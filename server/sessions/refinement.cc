@@ -33,13 +33,13 @@ constexpr absl::Duration kEndRetryDelay = absl::Seconds(1);
 // Before an operation of an earlier process comes again that found the queue full.
 constexpr absl::Duration kResumeRetryDelay = absl::Milliseconds(200);
 
-absl::StatusOr<core::Mesh> MeshFirst(const MesherFactory& create_mesher, const Session& session,
+absl::StatusOr<core::Mesh> MeshFirst(const MesherFactory& create_mesher, const SessionInputs& inputs,
                                      const core::MeshParameters& parameters, core::RunContext& context,
                                      SessionWork& work) {
   std::unique_ptr<core::Mesher> mesher;
   {
-    WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> points, session.points().CopyFrom(0, context));
-    WELLSPACE_ASSIGN_OR_RETURN(mesher, BeginMesh(create_mesher, parameters, points, session.features(), context));
+    WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> points, inputs.points->CopyFrom(0, context));
+    WELLSPACE_ASSIGN_OR_RETURN(mesher, BeginMesh(create_mesher, parameters, points, *inputs.features, context));
   }
   WELLSPACE_RETURN_IF_ERROR(core::ReserveMemory(*mesher, parameters, context));
   WELLSPACE_RETURN_IF_ERROR(mesher->Refine(parameters, context));
@@ -50,23 +50,22 @@ absl::StatusOr<core::Mesh> MeshFirst(const MesherFactory& create_mesher, const S
 
 // Builds the mesher that was given up, if it was. Watchers of the operation see the progress of what it was started for
 // alone.
-absl::Status BringBack(const MesherFactory& create_mesher, const Session& session, Job& job, SessionWork& work) {
+absl::Status BringBack(const MesherFactory& create_mesher, const SessionInputs& inputs, Job& job, SessionWork& work) {
   if (work.mesher == nullptr) {
     job.context().EnterPhase(core::Phase::kTree);
-    WELLSPACE_ASSIGN_OR_RETURN(
-        work.mesher, Replay(session.steps(), session.points(), session.features(), *work.mesh, create_mesher, job));
+    WELLSPACE_ASSIGN_OR_RETURN(work.mesher, Replay(inputs, *work.mesh, create_mesher, job));
   }
   return absl::OkStatus();
 }
 
 // `*has_changed`: the mesher may be another than before, on an error too.
-absl::StatusOr<core::Mesh> MeshAgain(const Session& session, const core::MeshParameters& parameters,
+absl::StatusOr<core::Mesh> MeshAgain(const SessionInputs& inputs, const core::MeshParameters& parameters,
                                      core::RunContext& context, SessionWork& work, bool* has_changed) {
   context.EnterPhase(core::Phase::kTree);
   WELLSPACE_RETURN_IF_ERROR(work.mesher->CheckFeasible(parameters));
   *has_changed = true;
-  const uint64_t count = session.points().coordinate_count() / parameters.dimension;
-  if (const absl::Status added = AddPointsTo(*work.mesher, session.points(), work.meshed_points, count, context);
+  if (const absl::Status added =
+          AddPointsTo(*work.mesher, *inputs.points, inputs.state->steps.points(), inputs.point_count(), context);
       !added.ok()) {
     *has_changed = false;  // it takes all or none
     return added;
@@ -81,7 +80,7 @@ absl::StatusOr<core::Mesh> MeshAgain(const Session& session, const core::MeshPar
 
 // What makes the last mesh `next`, if clients may want it, and it is small. Null otherwise, and where memory does not
 // allow it: they download the mesh then.
-std::shared_ptr<DeltaSnapshot> MakeDelta(const Session& session, const core::Mesh& next,
+std::shared_ptr<DeltaSnapshot> MakeDelta(const Session& session, const SessionInputs& inputs, const core::Mesh& next,
                                          const core::RunContext& context, const SessionWork& work) {
   const MeshSnapshot& last = *work.mesh;
   if (!session.deltas().IsWanted(last.revision())) {
@@ -94,7 +93,7 @@ std::shared_ptr<DeltaSnapshot> MakeDelta(const Session& session, const core::Mes
                                                   core::DeltaScratchBytes(last.figures().simplices) + most));
     WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<const core::Mesh> base, last.Whole(context));
     WELLSPACE_ASSIGN_OR_RETURN(const core::MeshDelta delta, core::DiffMeshes(*base, next, most, context));
-    made = std::make_shared<DeltaSnapshot>(last.revision(), session.NextMeshRevision(), delta, next);
+    made = std::make_shared<DeltaSnapshot>(last.revision(), NextRevision(*inputs.state), delta, next);
     return absl::OkStatus();
   });
   return status.ok() ? made : nullptr;
@@ -108,23 +107,23 @@ struct Made {
 
 // Has the mesh made, by what the session has given for it; `is_first`: by its points alone. What did not succeed leaves
 // nothing behind: a mesher that it has changed is given up, and comes back by Replay.
-absl::StatusOr<Made> MakeMesh(const MesherFactory& create_mesher, const Session& session,
+absl::StatusOr<Made> MakeMesh(const MesherFactory& create_mesher, const Session& session, const SessionInputs& inputs,
                               const core::MeshParameters& parameters, bool is_first, Job& job, SessionWork& work) {
   bool has_changed = is_first;
   const auto make = [&]() -> absl::StatusOr<core::Mesh> {
     if (is_first) {
       work.mesher = nullptr;  // of a restart
-      return MeshFirst(create_mesher, session, parameters, job.context(), work);
+      return MeshFirst(create_mesher, inputs, parameters, job.context(), work);
     }
-    WELLSPACE_RETURN_IF_ERROR(BringBack(create_mesher, session, job, work));
-    return MeshAgain(session, parameters, job.context(), work, &has_changed);
+    WELLSPACE_RETURN_IF_ERROR(BringBack(create_mesher, inputs, job, work));
+    return MeshAgain(inputs, parameters, job.context(), work, &has_changed);
   };
   Made made;
   const absl::Status status = RunGuarded([&] {
     WELLSPACE_ASSIGN_OR_RETURN(core::Mesh mesh, make());
     has_changed = true;
     if (!is_first) {
-      made.delta = MakeDelta(session, mesh, job.context(), work);
+      made.delta = MakeDelta(session, inputs, mesh, job.context(), work);
     }
     WELLSPACE_ASSIGN_OR_RETURN(made.mesh, session.KeepMesh(std::move(mesh), job.context()));
     return absl::OkStatus();
@@ -140,13 +139,13 @@ absl::StatusOr<Made> MakeMesh(const MesherFactory& create_mesher, const Session&
 
 // The same, in the memory of `job`; what mesher, mesh and delta have of it is theirs at the end, and the rest is
 // released.
-absl::StatusOr<Made> Work(const MesherFactory& create_mesher, const Session& session,
+absl::StatusOr<Made> Work(const MesherFactory& create_mesher, const Session& session, const SessionInputs& inputs,
                           const core::MeshParameters& parameters, bool is_first, Job& job, SessionWork& work) {
   job.GiveMemory(std::move(work.memory));
-  absl::StatusOr<Made> made = MakeMesh(create_mesher, session, parameters, is_first, job, work);
+  absl::StatusOr<Made> made = MakeMesh(create_mesher, session, inputs, parameters, is_first, job, work);
   if (work.mesher != nullptr) {
     work.memory = job.TakeMemory(work.mesher->memory_bytes());
-    work.memory.MakeLasting(session.MesherLasts());
+    work.memory.MakeLasting(inputs.lasts);
   }
   if (made.ok()) {
     MemoryReservation memory = job.TakeMemory(made->mesh->memory_bytes());
@@ -154,7 +153,7 @@ absl::StatusOr<Made> Work(const MesherFactory& create_mesher, const Session& ses
     made->mesh->KeepMemory(std::move(memory));
     if (made->delta != nullptr) {
       memory = job.TakeMemory(made->delta->memory_bytes());
-      memory.MakeLasting(session.MesherLasts());
+      memory.MakeLasting(inputs.lasts);
       made->delta->KeepMemory(std::move(memory));
     }
   }
@@ -184,17 +183,19 @@ void Run(const CallEnvironment& environment, const std::shared_ptr<Session>& ses
   if (!work.has_value()) {
     return;
   }
-  const bool is_first = session->steps().empty() || operation->restart();
+  const SessionInputs inputs = session->inputs();
+  const SessionSteps& steps = inputs.state->steps;
+  const bool is_first = steps.empty() || operation->restart();
   RefinementReport report{
       .operation = operation->name(),
       .tenant = session->tenant(),
       .status = absl::OkStatus(),
       .duration = absl::ZeroDuration(),
-      .points = session->points().coordinate_count() / operation->parameters().dimension,
-      .replayed_steps = work->mesher == nullptr && !is_first ? session->steps().all().size() : 0,
+      .points = inputs.point_count(),
+      .replayed_steps = work->mesher == nullptr && !is_first ? steps.count() : 0,
   };
-  absl::StatusOr<Made> made =
-      Work(environment.create_mesher, *session, session->ParametersOf(*operation), is_first, job, *work);
+  absl::StatusOr<Made> made = Work(environment.create_mesher, *session, inputs,
+                                   inputs.ParametersOf(operation->parameters()), is_first, job, *work);
   report.status = made.status();
   report.duration = SinceBoot() - start;
   if (made.ok()) {
@@ -228,9 +229,9 @@ absl::StatusOr<std::shared_ptr<Job>> Submit(const CallEnvironment& environment, 
                                             const std::shared_ptr<Operation>& operation) {
   const Session::Size size = session->GetSize(kMostSmallPoints);
   const uint64_t replayed_steps = operation->restart() ? 0 : size.replayed_steps;
-  const bool is_small =
-      size.points <= kMostSmallPoints && size.segments <= kMostSmallPoints &&
-      IsSmallRefinement(session->ParametersOf(*operation), size.some_points, size.vertices, replayed_steps);
+  const bool is_small = size.points <= kMostSmallPoints && size.segments <= kMostSmallPoints &&
+                        IsSmallRefinement(session->inputs().ParametersOf(operation->parameters()), size.some_points,
+                                          size.vertices, replayed_steps);
   WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Job> job,
                              environment.jobs.Submit({.tenant = session->tenant(),
                                                       .is_small = is_small,

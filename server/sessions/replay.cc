@@ -17,8 +17,8 @@ constexpr uint64_t kVerticesForOne = 2;
 // The structure as far as the steps have made it.
 class Structure {
  public:
-  Structure(const PointStore& points, const FeatureStore& features, const MesherFactory& create_mesher)
-      : points_(points), features_(features), create_mesher_(create_mesher) {}
+  Structure(const SessionInputs& inputs, const MesherFactory& create_mesher)
+      : inputs_(inputs), create_mesher_(create_mesher) {}
 
   absl::Status Take(const SessionStep& step, core::RunContext& context) {
     if (mesher_ == nullptr) {
@@ -28,10 +28,11 @@ class Structure {
     if (step.refined_with == nullptr) {
       return AddPointsUntil(step.end, context);
     }
-    WELLSPACE_RETURN_IF_ERROR(mesher_->Refine(*step.refined_with, context));
+    const core::MeshParameters parameters = inputs_.ParametersOf(step);
+    WELLSPACE_RETURN_IF_ERROR(mesher_->Refine(parameters, context));
     WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(mesher_->memory_bytes() + mesh_.points.size() * sizeof(double) +
                                                   mesh_.simplices.size() * sizeof(uint32_t)));
-    return mesher_->Update(mesh_, step.refined_with->threads, context);
+    return mesher_->Update(mesh_, parameters.threads, context);
   }
 
   const core::Mesh& mesh() const { return mesh_; }
@@ -39,12 +40,12 @@ class Structure {
 
  private:
   absl::Status Begin(const SessionStep& step, core::RunContext& context) {
-    const core::MeshParameters& parameters = *step.refined_with;
+    const core::MeshParameters parameters = inputs_.ParametersOf(step);
     {
       taken_ = step.end;
       WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> points,
-                                 points_.Copy(0, step.end * parameters.dimension, context));
-      WELLSPACE_ASSIGN_OR_RETURN(mesher_, BeginMesh(create_mesher_, parameters, points, features_, context));
+                                 inputs_.points->Copy(0, step.end * parameters.dimension, context));
+      WELLSPACE_ASSIGN_OR_RETURN(mesher_, BeginMesh(create_mesher_, parameters, points, *inputs_.features, context));
     }
     WELLSPACE_RETURN_IF_ERROR(core::ReserveMemory(*mesher_, parameters, context));
     WELLSPACE_RETURN_IF_ERROR(mesher_->Refine(parameters, context));
@@ -54,11 +55,10 @@ class Structure {
 
   absl::Status AddPointsUntil(uint64_t end, core::RunContext& context) {
     const uint64_t first = std::exchange(taken_, end);
-    return first == end ? absl::OkStatus() : AddPointsTo(*mesher_, points_, first, end, context);
+    return first == end ? absl::OkStatus() : AddPointsTo(*mesher_, *inputs_.points, first, end, context);
   }
 
-  const PointStore& points_;
-  const FeatureStore& features_;
+  const SessionInputs& inputs_;
   const MesherFactory& create_mesher_;
   std::unique_ptr<core::Mesher> mesher_;
   core::Mesh mesh_;
@@ -87,11 +87,10 @@ absl::Status AddPointsTo(core::Mesher& mesher, const PointStore& points, uint64_
   return mesher.AddPoints(added, context).status();
 }
 
-absl::StatusOr<std::unique_ptr<core::Mesher>> Replay(const SessionSteps& steps, const PointStore& points,
-                                                     const FeatureStore& features, const MeshSnapshot& last_mesh,
+absl::StatusOr<std::unique_ptr<core::Mesher>> Replay(const SessionInputs& inputs, const MeshSnapshot& last_mesh,
                                                      const MesherFactory& create_mesher, Job& job) {
-  Structure structure(points, features, create_mesher);
-  for (const SessionStep& step : steps.all()) {
+  Structure structure(inputs, create_mesher);
+  for (const SessionStep& step : inputs.state->steps.all()) {
     WELLSPACE_RETURN_IF_ERROR(job.RunApart([&](core::RunContext& context) { return structure.Take(step, context); }));
   }
   WELLSPACE_RETURN_IF_ERROR(last_mesh.CheckSame(structure.mesh()));

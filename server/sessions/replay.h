@@ -14,7 +14,7 @@
 #include "server/base/mesh_functions.h"
 #include "server/jobs/job.h"
 #include "server/sessions/feature_store.h"
-#include "server/sessions/session_steps.h"
+#include "server/sessions/session_inputs.h"
 #include "server/store/mesh_snapshot.h"
 #include "server/store/point_store.h"
 
@@ -39,18 +39,16 @@ uint64_t BytesWithVertices(const core::Mesher& mesher, uint64_t count);
 absl::Status AddPointsTo(core::Mesher& mesher, const PointStore& points, uint64_t first, uint64_t end,
                          core::RunContext& context);
 
-// Takes `steps` again, from the first on, in the work of `job` but apart from its context. `last_mesh` is the mesh of
-// the last refinement among them.
+// Takes the steps of `inputs` again, from the first on, in the work of `job` but apart from its context. `last_mesh` is
+// the mesh of the last refinement among them.
 //
-// REQUIRES:   `steps` is not empty; its points are in `points`, and what bounds them in `features`. Nothing changes
-//             these meanwhile.
+// REQUIRES:   there are steps; nothing changes the inputs meanwhile.
 // Guarantees: what is made of the mesher from now on is, to the bit, what would have been made of the one that the
 //             steps made.
 // Complexity: that of the steps. Reserves memory as the first refinement did.
 // Errors:     those of the steps: RESOURCE_EXHAUSTED, CANCELLED, DEADLINE_EXCEEDED; INTERNAL: the mesh is not
 //             `last_mesh`; DATA_LOSS.
-absl::StatusOr<std::unique_ptr<core::Mesher>> Replay(const SessionSteps& steps, const PointStore& points,
-                                                     const FeatureStore& features, const MeshSnapshot& last_mesh,
+absl::StatusOr<std::unique_ptr<core::Mesher>> Replay(const SessionInputs& inputs, const MeshSnapshot& last_mesh,
                                                      const MesherFactory& create_mesher, Job& job);
 
 }  // namespace wellspace::server

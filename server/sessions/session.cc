@@ -3,332 +3,321 @@
 #include <algorithm>
 #include <utility>
 
+#include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
 #include "server/wire/convert.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
-Session::Session(Settings settings, const ServiceOptions& options, MemoryBudget& memory, Clock clock,
-                 std::shared_ptr<TenantPoints> tenant_points, SessionLog& log)
-    : tenant_(std::move(settings.tenant)),
-      name_(std::move(settings.name)),
-      dimension_(settings.parameters.dimension),
-      create_time_(settings.create_time),
-      memory_(memory),
-      clock_(std::move(clock)),
-      log_(log),
-      parameters_(std::move(settings.parameters)),
-      labels_(std::move(settings.labels)),
-      lease_(settings.ttl, clock_.since_boot()),
-      point_account_(name_, dimension_, !log.is_durable(), options, memory, std::move(tenant_points)),
-      points_(log.OpenPoints(name_, dimension_, points_file_, {})) {}
+namespace {
 
-core::MeshParameters Session::parameters() const {
-  std::lock_guard lock(mutex_);
-  return parameters_;
+// What `state` holds of the limits.
+PointAccount::Held HeldBy(const SessionState& state) {
+  PointAccount::Held held{
+      .points = state.record.points(), .segments = state.record.segments(), .seeds = state.record.seeds()};
+  for (const SizesInUse& set : UnusedSizes(state, {}, 0)) {  // all of them
+    held.sizes += set.count;
+  }
+  return held;
 }
 
-v1::Session Session::Describe() const {
-  std::lock_guard lock(mutex_);
-  return DescribeWithLocked(labels_, lease_.ttl());
-}
+absl::Duration TtlOf(const SessionState& state) { return absl::Nanoseconds(state.record.ttl_ns()); }
 
-v1::Session Session::DescribeWithLocked(const std::map<std::string, std::string>& labels, absl::Duration ttl) const {
+// What a client sees of a session that is in `state`, and keeps `stored_bytes`.
+v1::Session DescriptionOf(const SessionState& state, const Occupancy& occupancy, const Clock& clock,
+                          uint64_t stored_bytes) {
+  const store::v1::SessionRecord& record = state.record;
   v1::Session message;
-  message.set_name(name_);
-  *message.mutable_create_time() = TimeToProto(create_time_);
-  message.set_state(busy_ == Busy::kOperation ? v1::Session::STATE_REFINING
-                    : is_ready_               ? v1::Session::STATE_READY
-                                              : v1::Session::STATE_OPEN);
-  *message.mutable_parameters() = ParametersToProto(parameters_);
-  message.mutable_labels()->insert(labels.begin(), labels.end());
-  *message.mutable_ttl() = DurationToProto(ttl);
-  const absl::Duration since_boot = clock_.since_boot();
-  const absl::Duration last_use = lease_.ExpiresAt(since_boot) - lease_.ttl();
-  *message.mutable_expire_time() = TimeToProto(clock_.wall() + (last_use + ttl - since_boot));
-  message.set_revision(revision_);
-  message.set_committed_points(committed_points_);
-  message.set_segment_count(feature_summary_.segments);
-  message.set_seed_count(feature_summary_.seeds);
-  message.set_faces(feature_summary_.faces);
-  message.set_crossings(feature_summary_.crossings);
-  if (feature_summary_.snap_distance > 0) {
-    message.set_snap_distance(feature_summary_.snap_distance);
+  message.set_name(record.name());
+  *message.mutable_create_time() = TimeToProto(absl::FromUnixNanos(record.create_time_ns()));
+  message.set_state(occupancy.busy == Busy::kOperation ? v1::Session::STATE_REFINING
+                    : record.is_ready()                ? v1::Session::STATE_READY
+                                                       : v1::Session::STATE_OPEN);
+  *message.mutable_parameters() = record.parameters();
+  *message.mutable_labels() = record.labels();
+  *message.mutable_ttl() = DurationToProto(TtlOf(state));
+  const absl::Duration since_boot = clock.since_boot();
+  const absl::Duration last_use = occupancy.lease.ExpiresAt(since_boot) - occupancy.lease.ttl();
+  *message.mutable_expire_time() = TimeToProto(clock.wall() + (last_use + TtlOf(state) - since_boot));
+  message.set_revision(record.revision());
+  message.set_committed_points(record.points());
+  message.set_segment_count(record.segments());
+  message.set_seed_count(record.seeds());
+  message.set_faces(record.faces());
+  message.set_crossings(record.crossings());
+  if (record.snap_distance() > 0) {
+    message.set_snap_distance(record.snap_distance());
   }
-  message.set_size_count(sizes_in_use_.count);
-  if (work_.mesh != nullptr) {
-    message.set_vertex_count(work_.mesh->figures().vertices);
-    message.set_simplex_count(work_.mesh->figures().simplices);
-  }
-  message.set_stored_bytes(point_account_.stored_bytes());
-  if (!operations_.empty()) {
-    message.set_last_operation(operations_.back()->name());
+  message.set_size_count(record.size_count());
+  message.set_vertex_count(record.mesh().vertices());
+  message.set_simplex_count(record.mesh().simplices());
+  message.set_stored_bytes(stored_bytes);
+  if (!state.operations.empty()) {
+    message.set_last_operation(NameOfOperation(state, state.operations.back()->number()));
   }
   return message;
 }
 
-bool Session::HasLabels(const std::map<std::string, std::string>& labels) const {
-  std::lock_guard lock(mutex_);
-  return std::all_of(labels.begin(), labels.end(), [this](const auto& label) {
-    const auto found = labels_.find(label.first);
-    return found != labels_.end() && found->second == label.second;
-  });
+// How long memory is reserved for the mesher of a session.
+Lasts LastsIn(const SessionLog& log) { return log.is_durable() ? Lasts::kUntilWanted : Lasts::kSession; }
+
+}  // namespace
+
+absl::StatusOr<std::shared_ptr<Session>> Session::Restore(const StoredSession& stored, const ServiceOptions& options,
+                                                          MemoryBudget& memory, Clock clock,
+                                                          std::shared_ptr<TenantPoints> tenant_points,
+                                                          SessionLog& log) {
+  WELLSPACE_ASSIGN_OR_RETURN(SessionState state, StateOf(stored));
+  std::deque<std::shared_ptr<Operation>> operations;
+  for (const std::shared_ptr<const store::v1::OperationRecord>& record : state.operations) {
+    WELLSPACE_ASSIGN_OR_RETURN(core::MeshParameters parameters, ParametersFromRecord(record->parameters()));
+    operations.push_back(std::make_shared<Operation>(NameOfOperation(state, record->number()),
+                                                     Operation::Resumed(record), std::move(parameters)));
+  }
+  std::shared_ptr<Session> session(new Session(std::move(state), PointsOf(stored.steps), options, memory,
+                                               std::move(clock), std::move(tenant_points), log));
+  absl::MutexLock lock(&session->mutex_);
+  session->operations_ = std::move(operations);
+  if (!session->operations_.empty() && !session->operations_.back()->HasEnded()) {
+    session->occupancy_.BeginBusy(Busy::kOperation);
+  }
+  return session;
+}
+
+Session::Session(SessionState state, std::vector<store::v1::StepRecord::Points> committed,
+                 const ServiceOptions& options, MemoryBudget& memory, Clock clock,
+                 std::shared_ptr<TenantPoints> tenant_points, SessionLog& log)
+    : identity_{.tenant = state.record.tenant(),
+                .name = state.name(),
+                .dimension = state.parameters->dimension,
+                .create_time = absl::FromUnixNanos(state.record.create_time_ns())},
+      memory_(memory),
+      clock_(std::move(clock)),
+      log_(log),
+      occupancy_{.lease = Lease(TtlOf(state), clock_.since_boot())},
+      account_(name(), dimension(), !log.is_durable(), options, memory, std::move(tenant_points)),
+      stores_{.dimension = dimension(),
+              .points = log.OpenPoints(name(), dimension(), state.record.points_file(), std::move(committed))} {
+  PointAccount::Held held = HeldBy(state);
+  stores_.are_loaded = held.segments == 0 && held.seeds == 0 && held.sizes == 0 && !state.record.has_rules();
+  if (state.record.has_mesh()) {
+    work_.mesh = log_.FindMesh(name(), state.record);
+    held.mesh_bytes = work_.mesh->loaded_bytes();
+  }
+  account_.Restore(held);
+  state_ = std::make_shared<const SessionState>(std::move(state));
+}
+
+// What is shown once the log has the change is made before: nothing is left then that could fail.
+absl::Status Session::Make(const SessionChange& change, absl::FunctionRef<void()> also, SessionLog::Survives survives) {
+  std::shared_ptr<const SessionState> before;
+  bool is_written = log_.is_durable();
+  {
+    absl::MutexLock lock(&mutex_);
+    before = state_;
+    is_written &= !occupancy_.is_closed;
+  }
+  WELLSPACE_ASSIGN_OR_RETURN(SessionState applied, Apply(*before, change));
+  auto after = std::make_shared<const SessionState>(std::move(applied));
+  if (is_written) {
+    WELLSPACE_RETURN_IF_ERROR(log_.Commit(change, survives));
+  }
+  absl::MutexLock lock(&mutex_);
+  state_ = std::move(after);
+  occupancy_.lease.SetTtl(TtlOf(*state_));
+  also();
+  return absl::OkStatus();
+}
+
+std::shared_ptr<const SessionState> Session::state() const {
+  absl::MutexLock lock(&mutex_);
+  return state_;
+}
+
+v1::Session Session::Describe() const {
+  absl::MutexLock lock(&mutex_);
+  return DescriptionOf(*state_, occupancy_, clock_, account_.stored_bytes());
 }
 
 bool Session::Renew() {
-  std::lock_guard lock(mutex_);
-  return !is_closed_ && lease_.Renew(clock_.since_boot());
+  absl::MutexLock lock(&mutex_);
+  return !occupancy_.is_closed && occupancy_.lease.Renew(clock_.since_boot());
 }
 
 bool Session::IsExpired() const {
-  std::lock_guard lock(mutex_);
-  return lease_.HasExpired(clock_.since_boot());
+  absl::MutexLock lock(&mutex_);
+  return occupancy_.lease.HasExpired(clock_.since_boot());
 }
 
-absl::Status Session::Update(std::optional<std::map<std::string, std::string>> labels,
+absl::Status Session::Update(const std::optional<std::map<std::string, std::string>>& labels,
                              std::optional<absl::Duration> ttl, uint64_t expected_revision,
                              const AnswerTo<v1::Session>& answer) {
-  std::lock_guard change_lock(change_mutex_);
+  absl::MutexLock change_lock(&change_mutex_);
+  SessionChange change;
   v1::Session described;
-  const absl::Duration next_ttl = ttl.value_or(lease_.ttl());
   {
-    std::lock_guard lock(mutex_);
-    WELLSPACE_RETURN_IF_ERROR(CheckOpenLocked());
-    WELLSPACE_RETURN_IF_ERROR(CheckRevisionLocked(expected_revision));
-    described = DescribeWithLocked(labels.value_or(labels_), next_ttl);
+    absl::MutexLock lock(&mutex_);
+    WELLSPACE_RETURN_IF_ERROR(CheckOpen(occupancy_, name()));
+    WELLSPACE_RETURN_IF_ERROR(CheckRevision(*state_, stores_.point_count(), expected_revision));
+    change = UpdateChange(*state_, labels, ttl);
+    WELLSPACE_ASSIGN_OR_RETURN(const SessionState after, Apply(*state_, change));
+    described = DescriptionOf(after, occupancy_, clock_, account_.stored_bytes());
   }
-  const std::optional<store::v1::AnswerRecord> answer_record = AnswerRecordOf(answer, described);
-  WELLSPACE_RETURN_IF_ERROR(CommitState([&](SessionChange& change) {
-    *change.state->mutable_labels() = described.labels();
-    change.state->set_ttl_ns(absl::ToInt64Nanoseconds(next_ttl));
-    change.answer = answer_record;
-  }));
-  std::lock_guard lock(mutex_);
-  if (labels.has_value()) {
-    labels_ = *std::move(labels);
-  }
-  lease_.SetTtl(next_ttl);
-  return absl::OkStatus();
+  change.answer = AnswerRecordOf(answer, described);
+  return Make(change, [] {});
 }
 
 absl::StatusOr<std::shared_ptr<Operation>> Session::Close(uint64_t expected_revision,
                                                           const std::optional<store::v1::AnswerRecord>& answer) {
-  std::lock_guard change_lock(change_mutex_);
+  absl::MutexLock change_lock(&change_mutex_);
+  SessionChange change;
   {
-    std::lock_guard lock(mutex_);
-    WELLSPACE_RETURN_IF_ERROR(CheckOpenLocked());
-    WELLSPACE_RETURN_IF_ERROR(CheckRevisionLocked(expected_revision));
+    absl::MutexLock lock(&mutex_);
+    WELLSPACE_RETURN_IF_ERROR(CheckOpen(occupancy_, name()));
+    WELLSPACE_RETURN_IF_ERROR(CheckRevision(*state_, stores_.point_count(), expected_revision));
+    change = DeletionChange(*state_);
   }
-  WELLSPACE_RETURN_IF_ERROR(Commit([&](SessionChange& change) {
-    change.is_deletion = true;
-    change.answer = answer;
+  change.answer = answer;
+  std::shared_ptr<Operation> under_way;
+  WELLSPACE_RETURN_IF_ERROR(Make(change, [&] {
+    mutex_.AssertHeld();
+    occupancy_.is_closed = true;
+    account_.Close();
+    under_way = occupancy_.busy == Busy::kOperation ? operations_.back() : nullptr;
   }));
-  std::lock_guard lock(mutex_);
-  CloseNowLocked();
-  return busy_ == Busy::kOperation ? operations_.back() : nullptr;
+  return under_way;
 }
 
 bool Session::CloseIfExpired() {
-  std::lock_guard lock(mutex_);
-  const bool is_expired = !is_closed_ && lease_.HasExpired(clock_.since_boot());
-  if (is_expired) {
-    CloseNowLocked();
+  absl::MutexLock lock(&mutex_);
+  if (occupancy_.is_closed || !occupancy_.lease.HasExpired(clock_.since_boot())) {
+    return false;
   }
-  return is_expired;
+  occupancy_.is_closed = true;
+  account_.Close();
+  return true;
 }
 
-void Session::CloseNowLocked() {
-  is_closed_ = true;
-  point_account_.Close();
+absl::Status Session::LogExpiry() {
+  absl::MutexLock change_lock(&change_mutex_);
+  return log_.is_durable() ? log_.Commit(DeletionChange(*state())) : absl::OkStatus();
 }
 
-void Session::BeginBusyLocked(Busy busy) {
-  busy_ = busy;
-  lease_.BeginUse();
-}
-
-void Session::EndBusyLocked() {
-  busy_ = Busy::kNo;
-  lease_.EndUse(clock_.since_boot());
-}
-
-absl::Status Session::CheckOpenLocked() const {
-  return is_closed_ ? MakeError(v1::ERROR_REASON_SESSION_NOT_FOUND,
-                                absl::StrCat(name_, " does not exist any more: it was deleted, or has expired"))
-                    : absl::OkStatus();
-}
-
-absl::Status Session::CheckRevisionLocked(uint64_t expected_revision) const {
-  return expected_revision == 0 || expected_revision == NextRevisionLocked()
-             ? absl::OkStatus()
-             : MakeError(v1::ERROR_REASON_REVISION_MISMATCH,
-                         absl::StrCat("expected_revision is ", expected_revision, ", but ", name_, " is at revision ",
-                                      NextRevisionLocked()));
-}
-
-absl::Status Session::CheckIdleLocked() const {
-  switch (busy_) {
-    case Busy::kNo:
+absl::Status Session::LoadInputs() {
+  std::vector<SizesInUse> wanted;
+  {
+    absl::MutexLock lock(&mutex_);
+    if (stores_.are_loaded) {
       return absl::OkStatus();
-    case Busy::kStarting:
-      return MakeError(v1::ERROR_REASON_SESSION_BUSY, absl::StrCat("an operation of ", name_, " is being started"));
-    case Busy::kOperation:
-      return MakeError(v1::ERROR_REASON_SESSION_BUSY,
-                       absl::StrCat(operations_.back()->name(), " is under way; wait for its end, or cancel it"));
-    case Busy::kAddingVertices:
-      return MakeError(v1::ERROR_REASON_SESSION_BUSY, absl::StrCat("vertices are being added to ", name_));
-    case Busy::kRemovingPoints:
-      return MakeError(v1::ERROR_REASON_SESSION_BUSY, absl::StrCat("points are being removed from ", name_));
-    case Busy::kReplaying:
-      break;
+    }
+    // The log has no records any more of a session that was deleted, which would pass for damage.
+    WELLSPACE_RETURN_IF_ERROR(CheckOpen(occupancy_, name()));
+    wanted = UnusedSizes(*state_, {}, 0);  // all of them
   }
-  return MakeError(v1::ERROR_REASON_SESSION_BUSY,
-                   absl::StrCat("a query or an addition of vertices has the structure of ", name_,
-                                " built again, which was given up; try again later"));
-}
-
-absl::Status Session::CheckReadyForChangeLocked(uint64_t expected_revision) const {
-  WELLSPACE_RETURN_IF_ERROR(CheckOpenLocked());
-  WELLSPACE_RETURN_IF_ERROR(CheckIdleLocked());
-  return CheckRevisionLocked(expected_revision);
-}
-
-absl::Status Session::CheckMeshLocked() const {
-  return work_.mesh != nullptr ? absl::OkStatus()
-                               : MakeError(v1::ERROR_REASON_MESH_NOT_READY,
-                                           absl::StrCat(name_, " has no mesh yet; start a refinement first"));
-}
-
-absl::Status Session::CheckStepsLocked() const {
-  WELLSPACE_RETURN_IF_ERROR(CheckMeshLocked());
-  if (points_file_ > work_.mesh->revision()) {
-    return MakeError(v1::ERROR_REASON_MESH_NOT_READY,
-                     absl::StrCat("the mesh of ", name_,
-                                  " is the one from before points were removed; it can be downloaded and located in, "
-                                  "and for anything else start a refinement first"));
+  WELLSPACE_ASSIGN_OR_RETURN(SizeSets sizes, ReadSizeSets(log_, name(), wanted));
+  WELLSPACE_ASSIGN_OR_RETURN(const std::vector<store::v1::StepRecord::Features> steps, log_.ReadFeatures(name()));
+  const auto features = std::make_shared<FeatureStore>();
+  for (const store::v1::StepRecord::Features& step : steps) {
+    features->Append(step.segments());
+    if (step.has_faces()) {
+      features->Append(step.faces());
+    }
   }
-  if (steps_.empty()) {
-    return MakeError(v1::ERROR_REASON_MESH_NOT_READY,
-                     absl::StrCat("the mesh of ", name_,
-                                  " is that of an earlier version of the server, which made other meshes; it can be "
-                                  "downloaded, and for anything else start a refinement first"));
-  }
+  absl::MutexLock lock(&mutex_);
+  stores_.features = features;
+  stores_.sizes = std::move(sizes);
+  stores_.are_loaded = true;
   return absl::OkStatus();
 }
 
-absl::Status Session::CheckStructureLocked() const {
-  WELLSPACE_RETURN_IF_ERROR(CheckStepsLocked());
-  if (work_.mesher != nullptr) {
-    return absl::OkStatus();
-  }
-  return MakeError(
-      v1::ERROR_REASON_MESH_NOT_READY,
-      absl::StrCat("the structure of ", name_, " was given up in this moment; ask again, and it is built again"));
-}
-
-SessionBox Session::BoxLocked() const {
-  return work_.mesh != nullptr
-             ? SessionBox{.low = work_.mesh->figures().domain_low, .high = work_.mesh->figures().domain_high}
-             : SessionBox{.low = parameters_.domain_low, .high = parameters_.domain_high};
+SessionInputs Session::inputs() const {
+  absl::MutexLock lock(&mutex_);
+  return {.state = state_,
+          .points = stores_.points,
+          .features = stores_.features,
+          .sizes = stores_.sizes,
+          .lasts = LastsIn(log_)};
 }
 
 std::shared_ptr<const MeshSnapshot> Session::mesh() const {
-  std::lock_guard lock(mutex_);
+  absl::MutexLock lock(&mutex_);
   return work_.mesh;
-}
-
-uint64_t Session::NextMeshRevision() const {
-  std::lock_guard lock(mutex_);
-  return revision_ + 1;  // no other change of it is made while the operation is under way
 }
 
 absl::StatusOr<std::shared_ptr<MeshSnapshot>> Session::KeepMesh(core::Mesh mesh,
                                                                 const core::RunContext& context) const {
+  uint64_t revision = 0;
   {
     // Before it is written anywhere. EndWork takes it into the account.
-    std::lock_guard lock(mutex_);
+    absl::MutexLock lock(&mutex_);
     WELLSPACE_RETURN_IF_ERROR(
-        point_account_.CheckMesh(MeshSnapshot::LoadedBytes(dimension_, mesh.vertex_count(), mesh.simplex_count())));
+        account_.CheckMesh(MeshSnapshot::LoadedBytes(dimension(), mesh.vertex_count(), mesh.simplex_count())));
+    revision = NextRevision(*state_);
   }
-  return log_.KeepMesh(name_, NextMeshRevision(), std::move(mesh), context);
+  return log_.KeepMesh(name(), revision, std::move(mesh), context);
 }
 
 absl::Status Session::Query(uint64_t* version, const std::function<absl::Status(const core::Mesher&)>& query) const {
-  std::shared_lock running(queries_mutex_, std::defer_lock);
   const core::Mesher* mesher = nullptr;
   {
-    std::lock_guard lock(mutex_);
-    WELLSPACE_RETURN_IF_ERROR(CheckOpenLocked());
-    WELLSPACE_RETURN_IF_ERROR(CheckIdleLocked());
-    WELLSPACE_RETURN_IF_ERROR(CheckStructureLocked());
-    if (*version != 0 && *version != structure_version_) {
+    absl::MutexLock lock(&mutex_);
+    WELLSPACE_RETURN_IF_ERROR(CheckIdle(occupancy_, *state_));
+    WELLSPACE_RETURN_IF_ERROR(CheckStructure(*state_, work_.mesher != nullptr));
+    if (*version != 0 && *version != state_->structure_version) {
       return MakeError(v1::ERROR_REASON_REVISION_MISMATCH,
-                       absl::StrCat(name_, " has changed since the first batch of this call"));
+                       absl::StrCat(name(), " has changed since the first batch of this call"));
     }
-    *version = structure_version_;
+    *version = state_->structure_version;
     mesher = work_.mesher.get();
-    running.lock();  // at once: the session is made busy before anything waits for queries
+    ++occupancy_.queries;  // whatever wants the structure for itself makes the session busy, and waits
   }
+  const auto end = absl::MakeCleanup([this] {
+    absl::MutexLock lock(&mutex_);
+    --occupancy_.queries;
+  });
   return query(*mesher);
 }
 
-absl::Status Session::RetryWithRoom(uint64_t bytes, const std::function<absl::Status()>& change) {
-  absl::Status made = change();
-  return IsMemoryLimit(made) && memory_.CanMakeRoom() && memory_.MakeRoom(bytes, MemoryBudget::Want::kAllOrNothing)
-             ? change()
-             : made;
-}
-
 void Session::NoteIdle() const {
-  {
-    std::lock_guard lock(mutex_);
-    if (!log_.is_durable() || SpareBytesLocked() == 0) {
-      return;
-    }
+  if (GetSpare().has_value()) {
+    memory_.NoteIdle();
   }
-  memory_.NoteIdle();
 }
 
 std::optional<Session::Spare> Session::GetSpare() const {
-  std::lock_guard lock(mutex_);
-  const uint64_t bytes = log_.is_durable() ? SpareBytesLocked() : 0;
-  if (bytes == 0) {
+  absl::MutexLock lock(&mutex_);
+  if (!log_.is_durable() || !occupancy_.IsIdle()) {
     return std::nullopt;
   }
-  return Spare{.bytes = bytes, .last_use = lease_.ExpiresAt(clock_.since_boot()) - lease_.ttl()};
-}
-
-uint64_t Session::SpareBytesLocked() const {
-  if (busy_ != Busy::kNo || structure_uses_ > 0) {
-    return 0;
-  }
-  return (work_.mesher == nullptr ? 0 : work_.memory.bytes()) + locator_.SpareBytes() + deltas_.memory_bytes();
+  const uint64_t bytes =
+      (work_.mesher == nullptr ? 0 : work_.memory.bytes()) + locator_.SpareBytes() + deltas_.memory_bytes();
+  const Lease& lease = occupancy_.lease;
+  return bytes == 0
+             ? std::nullopt
+             : std::optional(Spare{.bytes = bytes, .last_use = lease.ExpiresAt(clock_.since_boot()) - lease.ttl()});
 }
 
 uint64_t Session::GiveUpMesher() {
-  std::unique_ptr<core::Mesher> mesher;
+  SessionWork given_up;
   std::shared_ptr<const LocatedMesh> located;
   std::vector<MeshDeltas::Delta> deltas;
-  MemoryReservation memory;
   uint64_t delta_bytes = 0;
   {
-    std::lock_guard lock(mutex_);
-    std::unique_lock queries(queries_mutex_, std::try_to_lock);  // none can begin without mutex_
-    if (!log_.is_durable() || !queries.owns_lock() || SpareBytesLocked() == 0) {
+    absl::MutexLock lock(&mutex_);
+    if (!log_.is_durable() || !occupancy_.IsIdle() || occupancy_.queries > 0) {
       return 0;
     }
     located = locator_.GiveUp();
-    mesher = std::move(work_.mesher);
-    memory = std::move(work_.memory);
+    given_up = work_.TakeMesher();
     delta_bytes = deltas_.memory_bytes();
     deltas = deltas_.GiveUp();
   }
-  const uint64_t bytes = memory.bytes() + (located == nullptr ? 0 : located->memory.bytes()) + delta_bytes;
-  mesher = nullptr;  // before others may have its memory
+  const uint64_t bytes = given_up.memory.bytes() + (located == nullptr ? 0 : located->memory.bytes()) + delta_bytes;
+  given_up.mesher = nullptr;  // before others may have its memory
   located = nullptr;
   deltas.clear();
-  memory.Release();
+  given_up.memory.Release();
   return bytes;
 }
 

@@ -7,15 +7,16 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
-#include <shared_mutex>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "absl/base/thread_annotations.h"
+#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
 #include "core/mesher.h"
 #include "server/base/clock.h"
@@ -25,13 +26,14 @@
 #include "server/jobs/memory_budget.h"
 #include "server/sessions/answer_to.h"
 #include "server/sessions/feature_store.h"
-#include "server/sessions/lease.h"
 #include "server/sessions/mesh_deltas.h"
+#include "server/sessions/occupancy.h"
 #include "server/sessions/operation.h"
 #include "server/sessions/point_account.h"
-#include "server/sessions/session_box.h"
+#include "server/sessions/session_changes.h"
+#include "server/sessions/session_inputs.h"
 #include "server/sessions/session_locator.h"
-#include "server/sessions/session_steps.h"
+#include "server/sessions/session_state.h"
 #include "server/sessions/session_work.h"
 #include "server/store/mesh_snapshot.h"
 #include "server/store/point_store.h"
@@ -53,43 +55,34 @@ struct PointsLeft {
   uint64_t revision = 0;  // of the session
 };
 
-// A session. Its functions are in several files, which the parts of the class name:
+// A session in the process that has it: its state, which is a value (session_state.h), and what the process holds
+// beside it: stores of points, features and sizes, the mesher, the last mesh, live operations, and who is at work
+// (occupancy.h).
 //
-//   session.cc             what clients see, labels, lease and end; queries; the mesher that is given up; checks
+// A change is made by a pure function of the state and of what is asked for (session_changes.h); Make applies it, has
+// the log commit it, and shows the state after it. Functions are in several files:
+//
+//   session.cc             what clients see, labels, lease and end; queries; the mesher that is given up; Make
 //   session_points.cc      uploads                           session_features.cc    segments, seeds, rules of faces
 //   session_removal.cc     points that are taken out         session_operations.cc  operations
-//   session_sizes.cc       sizes at points
-//   session_structure.cc   the mesher that is built again, vertices that are added, the locator
-//   session_record.cc      how it is written down, and comes back
+//   session_sizes.cc       sizes at points                   session_structure.cc   the mesher that is built again,
+//                                                            vertices that are added, the locator
 //
-// What it is made of: session_work.h (mesher and mesh), session_steps.h, session_locator.h, mesh_deltas.h,
-// point_account.h, lease.h, operation.h, feature_store.h, session_box.h. Its states, and what changes them:
-// docs/design/sessions.md, "States".
+// States, and what changes them: docs/design/sessions.md, "States".
 //
-// Thread safety: thread-safe. Which lock is for what, and their order: below, at the members. Functions that change the
-//                session wait for the log: they are to be called where that holds up no other work.
-// Invariants: (1) revision grows with every change of the points, the features, the sizes or the mesh; (2) while the
-// session is busy, points, features, sizes, mesh, mesher and steps are touched by the work alone that has made it so;
-// (3) what did not succeed leaves the session as it was: structure and mesh are what Replay makes of the steps, whether
-// there is a mesher now or not; (4) no client is told of a change, and nothing shows it, before the log has it; one
-// that it cannot have is not made. An expiry, and what becomes of an operation, show even where it cannot have them.
+// Thread safety: thread-safe. Functions that change the session wait for the log: they are to be called where that
+//                holds up no other work.
+// Invariants: (1) the state is Apply of what the log has; (2) while the session is busy, points, features, sizes, mesh,
+// mesher and steps are touched by the work alone that has made it so; (3) what did not succeed leaves the session as it
+// was: structure and mesh are what Replay makes of the steps, whether there is a mesher now or not; (4) no client is
+// told of a change, and nothing shows it, before the log has it; one that it cannot have is not made. An expiry, and
+// what becomes of an operation, show even where it cannot have them.
 class Session {
  public:
-  struct Settings {
-    std::string tenant;
-    std::string name;  // "sessions/{session}"
-    core::MeshParameters parameters;
-    std::map<std::string, std::string> labels;
-    absl::Duration ttl;
-    absl::Time create_time;
-  };
-
-  // REQUIRES:   `options`, `memory` and `log` outlive this.
-  Session(Settings settings, const ServiceOptions& options, MemoryBudget& memory, Clock clock,
-          std::shared_ptr<TenantPoints> tenant_points, SessionLog& log);
-  // The session that was written down as `stored`: without mesher, its files not looked at yet. Its lease begins anew.
-  // An operation that had not ended waits for a worker again.
+  // A session that is written down as `stored`: without mesher, its files not looked at yet. Its lease begins now. An
+  // operation that had not ended waits for a worker again.
   //
+  // REQUIRES:   `options`, `memory` and `log` outlive it.
   // Errors:     those of parameters that this server does not know any more.
   static absl::StatusOr<std::shared_ptr<Session>> Restore(const StoredSession& stored, const ServiceOptions& options,
                                                           MemoryBudget& memory, Clock clock,
@@ -99,13 +92,13 @@ class Session {
 
   // ---- What clients see, labels, lease and end: session.cc ----
 
-  const std::string& tenant() const { return tenant_; }
-  const std::string& name() const { return name_; }
-  int dimension() const { return dimension_; }
-  absl::Time create_time() const { return create_time_; }
-  core::MeshParameters parameters() const;
+  const std::string& tenant() const { return identity_.tenant; }
+  const std::string& name() const { return identity_.name; }
+  int dimension() const { return identity_.dimension; }
+  absl::Time create_time() const { return identity_.create_time; }
+  // The state as it is now. It stays what it is.
+  std::shared_ptr<const SessionState> state() const;
   v1::Session Describe() const;
-  bool HasLabels(const std::map<std::string, std::string>& labels) const;
 
   // Renews the lease; false when it has run out already.
   bool Renew();
@@ -116,8 +109,9 @@ class Session {
   //
   // Errors:     REVISION_MISMATCH, SESSION_NOT_FOUND. Of this and all other changes, besides what is named there:
   //             DISK_FULL, STORE_FAILED.
-  absl::Status Update(std::optional<std::map<std::string, std::string>> labels, std::optional<absl::Duration> ttl,
-                      uint64_t expected_revision, const AnswerTo<v1::Session>& answer = nullptr);
+  absl::Status Update(const std::optional<std::map<std::string, std::string>>& labels,
+                      std::optional<absl::Duration> ttl, uint64_t expected_revision,
+                      const AnswerTo<v1::Session>& answer = nullptr);
 
   // For a session that leaves its registry: from now on every change, and every question about points and mesh, ends
   // with SESSION_NOT_FOUND. Returns the operation that is under way, which the caller is to cancel, or null.
@@ -128,13 +122,6 @@ class Session {
   // Closes the session if its lease has run out, so that nothing is under way. Says whether it has.
   bool CloseIfExpired();
 
-  // ---- How it is written down, and comes back: session_record.cc; Restore, above, too ----
-
-  // Writes down that there is this session. To be called once, of a new one, before others know it.
-  absl::Status LogCreation(const AnswerTo<v1::Session>& answer);
-  // For one that was written down before: writes down what the new process has changed of its operation, and returns
-  // it, for its work to be done; or null, if none was under way.
-  absl::StatusOr<std::shared_ptr<Operation>> ResumeOperation();
   // Writes down that a session which was closed by its lease is no more. Should that fail, it is there again after the
   // next start, with a new lease; until then it may be tried again.
   //
@@ -142,10 +129,6 @@ class Session {
   absl::Status LogExpiry();
 
   // ---- Uploads: session_points.cc ----
-
-  // Lets one upload have the session. False: another has it.
-  bool BeginUpload();
-  void EndUpload();
 
   // What a client believes that the session has.
   struct Prefix {
@@ -170,8 +153,6 @@ class Session {
   absl::Status CommitPoints();
   // Bytes of points that are appended and not committed.
   uint64_t UncommittedBytes() const;
-  // Points and revision, as one.
-  v1::UploadPointsResponse Committed() const;
 
   // ---- Points that are taken out: session_removal.cc ----
 
@@ -193,8 +174,6 @@ class Session {
   // Errors:     INVALID_SEGMENTS, INVALID_CHUNK_SHAPE, UPLOAD_GAP, UPLOAD_MISMATCH, DOMAIN_FIXED, SESSION_BUSY,
   //             TOO_MANY_POINTS, QUOTA_EXCEEDED, MEMORY_LIMIT, REVISION_MISMATCH, SESSION_NOT_FOUND.
   absl::Status AddSegments(const v1::AddSegmentsRequest& request, uint64_t expected_revision);
-  // Segments, seeds and revision, as one.
-  v1::AddSegmentsResponse CommittedSegments() const;
 
   // ---- Sizes at points: session_sizes.cc ----
 
@@ -205,19 +184,15 @@ class Session {
   // Complexity: O(samples).
   // Errors:     INVALID_SIZES (outside the domain), SESSION_BUSY, QUOTA_EXCEEDED, MEMORY_LIMIT, REVISION_MISMATCH,
   //             SESSION_NOT_FOUND. Nothing has changed.
-  // Where memory is short, idle sessions give some up first.
   absl::Status SetSizes(const std::shared_ptr<const core::SizeSamples>& samples, uint64_t expected_revision,
                         MemoryReservation* received = nullptr);
-  // The number of sizes, and the revision, as one.
-  v1::SetSizesResponse CommittedSizes() const;
 
   // ---- Mesh and queries, and what is given up for other work: session.cc ----
 
   // The last mesh; null before the first.
   std::shared_ptr<const MeshSnapshot> mesh() const;
   // What is known of how it came from the meshes before.
-  MeshDeltas& deltas() { return deltas_; }
-  const MeshDeltas& deltas() const { return deltas_; }
+  MeshDeltas& deltas() const { return deltas_; }
   // Runs `query` on this thread, a worker's. Any number of queries run at once. An operation that begins waits for the
   // queries that run: keep each short (some milliseconds), and call this again for the next batch.
   // `version` is the structure's: 0 for the first batch, which sets it; later batches leave it as it was set.
@@ -241,8 +216,6 @@ class Session {
   //
   // Complexity: that of freeing the mesher, on this thread, without a lock.
   uint64_t GiveUpMesher();
-  // How long memory is reserved for its mesher.
-  Lasts MesherLasts() const { return log_.is_durable() ? Lasts::kUntilWanted : Lasts::kSession; }
 
   // ---- The structure, vertices that are added, and the locator: session_structure.cc ----
 
@@ -270,8 +243,6 @@ class Session {
   //
   // Errors:     MESH_NOT_READY, REVISION_MISMATCH, SESSION_NOT_FOUND; of making it: MEMORY_LIMIT, CANCELLED, DATA_LOSS.
   absl::StatusOr<std::shared_ptr<const LocatedMesh>> PrepareLocator(uint64_t revision, Job& job);
-  // Whether that is there, and need not be made.
-  bool HasLocator() const;
 
   // How much there is to work on now.
   struct Size {
@@ -280,18 +251,22 @@ class Session {
     std::vector<double> some_points;  // all, if they are at most `few`; else none
     uint64_t vertices = 0;            // of the last mesh
     uint64_t replayed_steps = 0;  // that have to be replayed before other work than one that begins a structure anew
+    bool has_locator = false;     // of the last mesh, so that PrepareLocator makes none
   };
   Size GetSize(uint64_t few) const;
 
   // ---- Operations: session_operations.cc ----
 
-  // Begins an operation. The session is busy until the operation has ended. `submit` is called with it, to submit its
-  // work; what it refuses is not begun. With `restart` the structure is made anew, in the same box.
+  // For a session that was restored: writes down what the new process has changed of its operation, and returns it, for
+  // its work to be done; or null, if none was under way.
+  absl::StatusOr<std::shared_ptr<Operation>> ResumeOperation();
+  // Begins an operation. The session is busy until the operation has ended. `submit` is called with it, without any
+  // lock, to submit its work; what it refuses is not begun. With `restart` the structure is made anew, in the same box.
   //
   // Errors:     SESSION_BUSY, REVISION_MISMATCH, SESSION_NOT_FOUND; INVALID_PARAMETERS, of those that a domain with
   //             segments does not have; STORAGE_QUOTA_EXCEEDED, where there is no byte left for a first mesh; those
-  //             of `submit`. Of a log that fails, `submit` was called, and the operation
-  //             has ended without a trace.
+  //             of `submit`. Of a log that fails, and of a session that is closed meanwhile, `submit` was called, and
+  //             the operation has ended without a trace.
   using SubmitWork = std::function<absl::Status(const std::shared_ptr<Operation>&)>;
   absl::StatusOr<std::shared_ptr<Operation>> StartOperation(core::MeshParameters parameters, bool restart,
                                                             uint64_t expected_revision, const SubmitWork& submit,
@@ -316,15 +291,8 @@ class Session {
   // The operations after number `after`, the oldest first, at most `count`.
   std::vector<std::shared_ptr<Operation>> ListOperations(uint64_t after, size_t count) const;
 
-  // The following are for the operation that is under way.
-  const PointStore& points() const { return *points_; }
-  const FeatureStore& features() const { return features_; }
-  // Those of `operation`, and the sizes at points that it keeps to.
-  core::MeshParameters ParametersOf(const Operation& operation) const;
-  // What has made the structure.
-  const SessionSteps& steps() const { return steps_; }
-  // The revision of the mesh that it makes.
-  uint64_t NextMeshRevision() const;
+  // What the work that has made the session busy computes from.
+  SessionInputs inputs() const;
   // Keeps `mesh`, the work of an operation that is under way, as the log keeps meshes.
   //
   // Errors:     those of SessionLog::KeepMesh; STORAGE_QUOTA_EXCEEDED.
@@ -333,177 +301,74 @@ class Session {
  private:
   friend class SessionUse;
   friend class StructureUse;
+  friend class UploadUse;
+  friend class PointRemoval;
+  friend class VertexAddition;
 
-  // Which change of the points or the mesh is under way. There is one at most.
-  enum class Busy { kNo, kStarting, kOperation, kAddingVertices, kRemovingPoints, kReplaying };
+  // What never changes.
+  struct Identity {
+    std::string tenant;
+    std::string name;  // "sessions/{session}"
+    int dimension = 0;
+    absl::Time create_time;
+  };
+  // What clients have sent.
+  struct Stores {
+    int dimension = 0;
+    std::shared_ptr<PointStore> points;
+    uint32_t new_crc32c = 0;  // of the points behind those of the state, which are not committed
+    std::shared_ptr<FeatureStore> features = std::make_shared<FeatureStore>();
+    SizeSets sizes{};
+    bool are_loaded = true;  // false: features and sizes were written down by another process, and not read yet
 
-  // ---- For those that hold change_mutex_, and not mutex_ ----
+    // Points that are committed, and that are not.
+    uint64_t point_count() const { return points->coordinate_count() / dimension; }
+    AppendedPoints appended() const { return {.end = point_count(), .crc32c = new_crc32c}; }
+  };
 
-  // Writes down what `fill` makes of an empty change, if the log keeps anything and the session is not closed.
-  absl::Status Commit(const std::function<void(SessionChange&)>& fill,
-                      SessionLog::Survives survives = SessionLog::Survives::kPowerLoss);
-  // The same of a change that has the state of the session as it is now.
-  absl::Status CommitState(const std::function<void(SessionChange&)>& fill);
+  Session(SessionState state, std::vector<store::v1::StepRecord::Points> committed, const ServiceOptions& options,
+          MemoryBudget& memory, Clock clock, std::shared_ptr<TenantPoints> tenant_points, SessionLog& log);
+
+  // Makes `change`: has the log commit it, if that keeps anything and the session is not closed, and shows the state
+  // after it. `also` is called with mutex_ held, when the state is shown: what the process holds changes with it.
+  //
+  // Errors:     those of SessionLog::Commit, and an exception when memory ends: nothing has changed.
+  absl::Status Make(const SessionChange& change, absl::FunctionRef<void()> also,
+                    SessionLog::Survives survives = SessionLog::Survives::kPowerLoss)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_);
   // Reads segments, seeds and sizes that were written down by another process, if that was not done yet. Whatever looks
   // at them calls this first, without mutex_, since it reads files.
   //
   // Errors:     SESSION_NOT_FOUND, DATA_LOSS.
-  absl::Status LoadInputs();
-  absl::Status LoadSizes();
-  // Writes down what AddSegments has appended: all of `request` but for what was known.
-  absl::Status CommitFeatures(const v1::AddSegmentsRequest& request, uint64_t known_segments, uint64_t known_seeds);
-  // Adds to `change` that points have come: those from committed_points_ on, up to number `end`, whose checksum is
-  // `crc32c`.
-  void AddPointsTo(SessionChange& change, uint64_t end, uint32_t crc32c) const;
-  absl::Status CommitStart(const Operation& operation, uint64_t end, const AnswerTo<v1::Operation>& answer);
-  absl::Status CommitSuccess(const Operation& operation, const WorkResult& result, absl::Time now);
-  // Counts the mesh of the work against the tenant's bytes, and commits it: both or, on an error, neither.
-  absl::Status TakeSuccess(const Operation& operation, const WorkResult& result, absl::Time now);
+  absl::Status LoadInputs() ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_) ABSL_LOCKS_EXCLUDED(mutex_);
 
-  // ---- For those that hold mutex_; const ones also for the work that has made the session busy, without it ----
+  // The parts of StartOperation and EndWork that commit.
+  absl::Status CommitStart(const std::shared_ptr<Operation>& operation, const AnswerTo<v1::Operation>& answer)
+      ABSL_LOCKS_EXCLUDED(change_mutex_);
+  absl::Status CommitSuccess(Operation& operation, WorkResult& result) ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_);
 
-  v1::Session DescribeWithLocked(const std::map<std::string, std::string>& labels, absl::Duration ttl) const;
-  store::v1::SessionRecord RecordLocked() const;
-  void KeepLocked(std::shared_ptr<Operation> operation);
-  // The points up to number `end` are the session's from now on.
-  void NotePointsLocked(uint64_t end);
-  // All points are meshed, by `operation`, which has succeeded.
-  void NoteRefinementLocked(const Operation& operation);
-  // The sets of sizes that are of no use once only `steps`, and the set `current`, are there.
-  std::vector<SizesInUse> UnusedSizesLocked(const SessionSteps& steps, uint64_t current) const;
-  // Drops points that are not committed.
-  void DropUncommittedLocked();
-  // What GiveUpMesher would free, of a durable session.
-  uint64_t SpareBytesLocked() const;
-  uint64_t PointCountLocked() const { return points_->coordinate_count() / dimension_; }
-  // Of the points that are appended and not committed.
-  bool HasUncommittedLocked() const { return PointCountLocked() > committed_points_; }
-  // What the revision is when what was appended is committed.
-  uint64_t NextRevisionLocked() const { return revision_ + (HasUncommittedLocked() ? 1 : 0); }
-  // Refuses ascending `numbers` that are not all points, or of which segments are made.
-  absl::Status CheckRemovableLocked(std::span<const uint64_t> numbers) const;
-  absl::Status CheckOpenLocked() const;
-  absl::Status CheckRevisionLocked(uint64_t expected_revision) const;
-  absl::Status CheckIdleLocked() const;
-  // All three of these.
-  absl::Status CheckReadyForChangeLocked(uint64_t expected_revision) const;
-  // Whether there is a mesh.
-  absl::Status CheckMeshLocked() const;
-  // Whether there is a structure to query, or steps that Replay can take.
-  absl::Status CheckStepsLocked() const;
-  // Whether there is a structure to query now.
-  absl::Status CheckStructureLocked() const;
-  SessionBox BoxLocked() const;
-  void CloseNowLocked();
-  // The session is the caller's alone until EndBusyLocked, and does not expire.
-  void BeginBusyLocked(Busy busy);
-  void EndBusyLocked();
-
-  // ---- For those that hold neither ----
-
-  // What Restore sets besides steps and operations, before others know the session.
-  void SetState(const StoredSession& stored);
-  // What SetSizes and AddSegments do, but for RetryWithRoom.
-  absl::Status TryToSetSizes(const std::shared_ptr<const core::SizeSamples>& samples, uint64_t expected_revision,
-                             MemoryReservation* received);
-  absl::Status TryToAddSegments(const v1::AddSegmentsRequest& request, uint64_t expected_revision);
-  // Returns `change()`. Where memory has no room for it, it is called once more after idle sessions gave up `bytes`.
-  absl::Status RetryWithRoom(uint64_t bytes, const std::function<absl::Status()>& change);
-  // The last mesh. Errors: SESSION_NOT_FOUND, MESH_NOT_READY, REVISION_MISMATCH. `revision` 0: any.
-  absl::StatusOr<std::shared_ptr<const MeshSnapshot>> MeshAt(uint64_t revision) const;
-  // Waits for the queries that run. To be called when the session is busy, so that no other can begin.
-  void WaitForQueries();
-  // Builds the mesher again. For the work that has made the session Busy::kReplaying.
-  absl::Status Rebuild(const MesherFactory& create_mesher, Job& job);
-
-  // The parts of AddVertices, in their order.
-
-  // What it does before it touches the mesher; makes the session Busy::kAddingVertices. The following are for the work
-  // that has made it so.
-  absl::Status BeginAddition(std::span<const double> points, std::span<const uint32_t> near,
-                             uint64_t expected_revision);
-  // The part that the mesher does. First it takes in the points that were uploaded since it was last refined;
-  // `*uploaded` says how many it has taken in, on an error too.
-  absl::StatusOr<std::vector<uint32_t>> AddToMesher(std::span<const double> points, std::span<const uint32_t> near,
-                                                    core::RunContext& context, uint64_t* uploaded);
-  // The end where the mesher has taken `points` in, after `uploaded` others: the log has them then.
-  absl::Status CommitAddition(std::span<const double> points, uint64_t uploaded, const AnswerTo<AddedVertices>& answer,
-                              AddedVertices* added);
-  // Gives the mesher up, where it has what the session does not get.
-  void DropMesher();
-
-  // The parts of RemovePoints, in their order.
-
-  // What it does before it copies points; makes the session Busy::kRemovingPoints. The following are for the work that
-  // has made it so.
-  absl::Status BeginRemoval(std::span<const uint64_t> numbers, uint64_t expected_revision);
-  // What is left of the points.
-  struct KeptPoints {
-    MemoryReservation memory;           // that the copy takes besides, if it is in memory
-    std::unique_ptr<PointStore> store;  // synchronised
-    uint64_t file = 0;                  // its number
-    uint32_t crc32c = 0;
-  };
-  // `*kept` is what there is of it, on an error too.
-  absl::Status CopyPointsWithout(std::span<const uint64_t> numbers, KeptPoints* kept);
-  // The end: the session has what is kept from now on.
-  absl::StatusOr<PointsLeft> CommitRemoval(KeptPoints& kept, const AnswerTo<PointsLeft>& answer);
-
-  const std::string tenant_;
-  const std::string name_;
-  const int dimension_;
-  const absl::Time create_time_;
+  const Identity identity_;
   MemoryBudget& memory_;
   const Clock clock_;
   SessionLog& log_;
 
-  // Locks, in their order; none is taken under one that stands below it. What others take before, between and after:
-  // docs/design/sessions.md, "Locks".
-  mutable std::mutex change_mutex_;          // held over a change, from its checks until it is made
-  mutable std::mutex mutex_;                 // guards what is below; never held over meshing, or over a commit
-  mutable std::shared_mutex queries_mutex_;  // held shared by a batch of queries, over its work
-  // Beside change_mutex_: no one holds both. It has its own locks, one of them before mutex_.
+  // Two locks, in their order. What others take before, between and after: docs/design/sessions.md, "Locks".
+  //
+  // The first is the turn of changes: who holds it alone replaces the state, and may do so after a commit. The second
+  // guards all that others see; it is never held over meshing, or over a commit.
+  mutable absl::Mutex change_mutex_ ABSL_ACQUIRED_BEFORE(mutex_);
+  mutable absl::Mutex mutex_;
+  // These have locks of their own. No one holds change_mutex_ and wants the first.
   SessionLocator locator_;
+  mutable MeshDeltas deltas_;
 
-  // What is below is written with mutex_ held, and read with it. But:
-  //   - of a session that is busy, work_.mesher and work_.memory belong to the work that has made it so, which writes
-  //     them without mutex_. Others look at busy_ first, and leave them alone;
-  //   - that work reads without mutex_ what invariant (2) keeps from all others: points_, features_, sizes_, work_,
-  //     steps_, parameters_; and while points are removed, when none are committed, committed_points_ and revision_;
-  //   - who holds change_mutex_ reads without mutex_ what changes under both alone: parameters_, labels_, the length of
-  //     lease_, features_, sizes_, sizes_in_use_, are_inputs_loaded_, steps_, operations_, next_operation_, and, of a
-  //     session that is busy or durable, revision_ and committed_points_; before others know the session, busy_;
-  //   - while vertices are added, none but the work that adds them takes points into point_account_, or out of it.
-  core::MeshParameters parameters_;  // of the last refinement that succeeded; before it, those of the creation
-  std::map<std::string, std::string> labels_;
-  Lease lease_;
-  bool is_closed_ = false;
-  Busy busy_ = Busy::kNo;
-  bool is_uploading_ = false;
-  bool is_ready_ = false;  // the mesh is that of all points
-  uint64_t revision_ = 1;
-  // Five counts of points, each at most the one before but for the moment in which vertices are added:
-  // point_account_.points() are paid for, those that AddVertices is adding included; PointCountLocked() are in points_;
-  // committed_points_ are the session's, as clients see them; work_.meshed_points are in the mesher, or would be if it
-  // was not given up; steps_.points() are what Replay makes a mesher of.
-  PointAccount point_account_;
-  uint64_t points_file_ = 0;  // the number of the file of points_, which is made with it
-  std::unique_ptr<PointStore> points_;
-  uint64_t committed_points_ = 0;
-  uint32_t uncommitted_crc32c_ = 0;  // of the points behind the committed ones
-  FeatureStore features_;
-  FeatureSummary feature_summary_;                  // of them, read or not
-  std::shared_ptr<const core::SizeSamples> sizes_;  // null: none, or not read
-  SizesInUse sizes_in_use_;                         // which these are
-  uint64_t sizes_revision_ = 0;  // at which they came, or went; 0: unknown, as none are there and another process began
-  bool are_inputs_loaded_ = true;  // false: features and sizes were written down by another process, and not read yet
-  SessionWork work_;               // its mesher is away while an operation runs
-  SessionSteps steps_;
-  uint64_t structure_version_ = 0;  // of what queries see; 0: nothing yet
-  MeshDeltas deltas_;               // has a lock of its own, after mutex_
-  int structure_uses_ = 0;          // while there are any, the mesher is not given up for other work
-  uint64_t next_operation_ = 1;
-  std::deque<std::shared_ptr<Operation>> operations_;  // ascending by number
+  // Never null; written with both locks held, by Make alone.
+  std::shared_ptr<const SessionState> state_ ABSL_GUARDED_BY(mutex_);
+  mutable Occupancy occupancy_ ABSL_GUARDED_BY(mutex_);  // queries come and go
+  PointAccount account_ ABSL_GUARDED_BY(mutex_);         // what is paid for, vertices that are being added included
+  Stores stores_ ABSL_GUARDED_BY(mutex_);     // the work that has made the session busy reads them by inputs()
+  SessionWork work_ ABSL_GUARDED_BY(mutex_);  // its mesher is away while work has the session
+  std::deque<std::shared_ptr<Operation>> operations_ ABSL_GUARDED_BY(mutex_);  // those of the state, alive
 };
 
 }  // namespace wellspace::server

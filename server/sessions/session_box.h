@@ -4,7 +4,6 @@
 
 #include <cstdint>
 #include <span>
-#include <vector>
 
 #include "absl/status/status.h"
 #include "core/geometry/criterion.h"
@@ -14,8 +13,8 @@ namespace wellspace::server {
 // That of the mesh; before there is one, that of the parameters. If none was given it is open, and grows with the
 // points: both corners are empty. A view.
 struct SessionBox {
-  const std::vector<double>& low;
-  const std::vector<double>& high;
+  std::span<const double> low;
+  std::span<const double> high;
 
   bool IsOpen() const { return low.empty(); }
 };

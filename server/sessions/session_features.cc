@@ -68,88 +68,56 @@ absl::Status CheckRepeatedFeatures(const v1::AddSegmentsRequest& request, const 
 }  // namespace
 
 absl::Status Session::AddSegments(const v1::AddSegmentsRequest& request, uint64_t expected_revision) {
-  return RetryWithRoom(FeatureStore::BytesOf(request.segments().ends_size() / 2, request.faces().seeds_size()),
-                       [&] { return TryToAddSegments(request, expected_revision); });
-}
-
-absl::Status Session::TryToAddSegments(const v1::AddSegmentsRequest& request, uint64_t expected_revision) {
   WELLSPACE_RETURN_IF_ERROR(CheckSegments(request.segments(), request.segment_offset()));
   WELLSPACE_RETURN_IF_ERROR(CheckFaces(request.faces(), request.seed_offset()));
-  if (dimension_ != 2) {
-    return NotInThePlane(request.has_segments() || !request.has_faces() ? "segments" : "faces", dimension_);
+  if (dimension() != 2) {
+    return NotInThePlane(request.has_segments() || !request.has_faces() ? "segments" : "faces", dimension());
   }
-  std::lock_guard change_lock(change_mutex_);
+  absl::MutexLock change_lock(&change_mutex_);
   WELLSPACE_RETURN_IF_ERROR(LoadInputs());
   uint64_t known_segments = 0;
   uint64_t known_seeds = 0;
   const uint64_t all_segments = request.segments().ends_size() / 2;
   const uint64_t all_seeds = request.faces().seeds_size();
+  FeatureSummary before;
   {
-    std::lock_guard lock(mutex_);
-    WELLSPACE_RETURN_IF_ERROR(CheckReadyForChangeLocked(expected_revision));
-    WELLSPACE_RETURN_IF_ERROR(CheckRepeatedFeatures(request, features_, name_, &known_segments, &known_seeds));
+    absl::MutexLock lock(&mutex_);
+    const FeatureStore& features = *stores_.features;
+    WELLSPACE_RETURN_IF_ERROR(CheckReady(occupancy_, *state_, stores_.point_count(), expected_revision));
+    WELLSPACE_RETURN_IF_ERROR(CheckRepeatedFeatures(request, features, name(), &known_segments, &known_seeds));
     if (known_segments == all_segments && known_seeds == all_seeds &&
-        !(request.has_faces() && features_.HasOtherRules(request.faces()))) {
+        !(request.has_faces() && features.HasOtherRules(request.faces()))) {
       return absl::OkStatus();
     }
-    if (work_.mesh != nullptr) {
+    if (CheckMesh(*state_).ok()) {
       return MakeError(v1::ERROR_REASON_DOMAIN_FIXED,
-                       absl::StrCat(name_,
+                       absl::StrCat(name(),
                                     " has been refined; segments and faces can be added only before the first "
                                     "refinement: create another session for this domain"));
     }
-    WELLSPACE_RETURN_IF_ERROR(point_account_.TakeFeatures(all_segments - known_segments, all_seeds - known_seeds));
+    WELLSPACE_RETURN_IF_ERROR(account_.TakeFeatures(all_segments - known_segments, all_seeds - known_seeds));
+    before = features.Summary();
   }
-  const FeatureSummary before = features_.Summary();
-  const absl::Status status = RunGuarded([&] {
+  absl::Status status = RunGuarded([&] {
+    SessionChange change;
     {
-      std::lock_guard lock(mutex_);
-      features_.Append(request.segments(), known_segments);
+      absl::MutexLock lock(&mutex_);
+      FeatureStore& features = *stores_.features;
+      features.Append(request.segments(), known_segments);
       if (request.has_faces()) {
-        features_.Append(request.faces(), known_seeds);
+        features.Append(request.faces(), known_seeds);
       }
+      change = FeaturesChange(*state_, request, known_segments, known_seeds, features.Summary());
     }
-    return CommitFeatures(request, known_segments, known_seeds);
+    change_mutex_.AssertHeld();
+    return Make(change, [] {});
   });
-  std::lock_guard lock(mutex_);
   if (!status.ok()) {
-    features_.TakeBack(before);
-    point_account_.ReturnFeatures(all_segments - known_segments, all_seeds - known_seeds);
-    return status;
+    absl::MutexLock lock(&mutex_);
+    stores_.features->TakeBack(before);
+    account_.ReturnFeatures(all_segments - known_segments, all_seeds - known_seeds);
   }
-  feature_summary_ = features_.Summary();
-  ++revision_;
-  return absl::OkStatus();
-}
-
-absl::Status Session::CommitFeatures(const v1::AddSegmentsRequest& request, uint64_t known_segments,
-                                     uint64_t known_seeds) {
-  return CommitState([&](SessionChange& change) {
-    store::v1::StepRecord::Features& step = *change.steps.emplace_back().mutable_features();
-    *step.mutable_segments() = request.segments();
-    step.mutable_segments()->mutable_ends()->ExtractSubrange(0, static_cast<int>(2 * known_segments), nullptr);
-    if (request.segments().markers_size() != 0) {
-      step.mutable_segments()->mutable_markers()->ExtractSubrange(0, static_cast<int>(known_segments), nullptr);
-    }
-    if (request.segments().groups_size() != 0) {
-      step.mutable_segments()->mutable_groups()->ExtractSubrange(0, static_cast<int>(known_segments), nullptr);
-    }
-    if (request.has_faces()) {
-      *step.mutable_faces() = request.faces();
-      step.mutable_faces()->mutable_seeds()->DeleteSubrange(0, static_cast<int>(known_seeds));
-    }
-    SetFeatures(features_.Summary(), *change.state);
-    change.state->set_revision(change.state->revision() + 1);
-  });
-}
-
-v1::AddSegmentsResponse Session::CommittedSegments() const {
-  v1::AddSegmentsResponse message;
-  std::lock_guard lock(mutex_);
-  message.set_segment_count(feature_summary_.segments);
-  message.set_seed_count(feature_summary_.seeds);
-  message.set_revision(revision_);
-  return message;
+  return status;
 }
 
 }  // namespace wellspace::server

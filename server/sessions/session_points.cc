@@ -40,112 +40,89 @@ absl::Status CheckRepeatedPoints(const PointStore& points, int dimension, uint64
 
 }  // namespace
 
-bool Session::BeginUpload() {
-  std::lock_guard lock(mutex_);
-  return !std::exchange(is_uploading_, true);
-}
-
-void Session::EndUpload() {
-  std::lock_guard lock(mutex_);
-  is_uploading_ = false;
-}
-
 absl::Status Session::CheckPrefix(const Prefix& prefix) const {
-  std::lock_guard lock(mutex_);
-  WELLSPACE_RETURN_IF_ERROR(CheckOpenLocked());
-  WELLSPACE_RETURN_IF_ERROR(CheckIdleLocked());
-  WELLSPACE_RETURN_IF_ERROR(CheckNoGap(prefix.end, point_account_.points(), name_));
+  absl::MutexLock lock(&mutex_);
+  WELLSPACE_RETURN_IF_ERROR(CheckIdle(occupancy_, *state_));
+  WELLSPACE_RETURN_IF_ERROR(CheckNoGap(prefix.end, stores_.point_count(), name()));
   WELLSPACE_ASSIGN_OR_RETURN(const uint32_t checksum,
-                             points_->Checksum(prefix.first * dimension_, prefix.end * dimension_));
+                             stores_.points->Checksum(prefix.first * dimension(), prefix.end * dimension()));
   return checksum == prefix.crc32c
              ? absl::OkStatus()
              : MakeError(v1::ERROR_REASON_UPLOAD_MISMATCH,
-                         absl::StrCat(name_, " has other points from number ", prefix.first, " up to ", prefix.end,
+                         absl::StrCat(name(), " has other points from number ", prefix.first, " up to ", prefix.end,
                                       " than those that this upload goes on after: their checksum is ", checksum,
-                                      ", not ", prefix.crc32c, "; add these points at ", point_account_.points(),
+                                      ", not ", prefix.crc32c, "; add these points at ", stores_.point_count(),
                                       ", or to another session"),
                          "checked_crc32c");
 }
 
 absl::Status Session::Append(uint64_t offset, std::span<const double> coordinates, uint64_t expected_revision) {
-  std::lock_guard lock(mutex_);
-  WELLSPACE_RETURN_IF_ERROR(CheckReadyForChangeLocked(expected_revision));
-  if (coordinates.size() % dimension_ != 0) {
-    return MakeError(v1::ERROR_REASON_INVALID_CHUNK_SHAPE,
-                     absl::StrCat("the chunk at point ", offset, " has ", coordinates.size(),
-                                  " coordinates; expected a multiple of the dimension ", dimension_),
-                     "points.coordinates");
+  {
+    absl::MutexLock lock(&mutex_);
+    WELLSPACE_RETURN_IF_ERROR(CheckReady(occupancy_, *state_, stores_.point_count(), expected_revision));
+    if (coordinates.size() % dimension() != 0) {
+      return MakeError(v1::ERROR_REASON_INVALID_CHUNK_SHAPE,
+                       absl::StrCat("the chunk at point ", offset, " has ", coordinates.size(),
+                                    " coordinates; expected a multiple of the dimension ", dimension()),
+                       "points.coordinates");
+    }
+    const uint64_t count = stores_.point_count();  // those that are not committed yet, too
+    WELLSPACE_RETURN_IF_ERROR(CheckNoGap(offset, count, name()));
+    const uint64_t known = std::min<uint64_t>(count - offset, coordinates.size() / dimension());
+    WELLSPACE_RETURN_IF_ERROR(
+        CheckRepeatedPoints(*stores_.points, dimension(), offset, coordinates.first(known * dimension()), name()));
+    coordinates = coordinates.subspan(known * dimension());
+    if (coordinates.empty()) {
+      return absl::OkStatus();
+    }
+    WELLSPACE_RETURN_IF_ERROR(CheckPoints(BoxOf(*state_), dimension(), count, coordinates));
+    WELLSPACE_RETURN_IF_ERROR(account_.Take(coordinates.size() / dimension()));
+    PointStore& points = *stores_.points;
+    if (absl::Status appended = RunGuarded([&] { return points.Append(coordinates); }); !appended.ok()) {
+      account_.Return(coordinates.size() / dimension());
+      return appended;
+    }
+    stores_.new_crc32c = ExtendCrc32c(stores_.new_crc32c, coordinates.data(), coordinates.size_bytes());
   }
-  WELLSPACE_RETURN_IF_ERROR(CheckNoGap(offset, point_account_.points(), name_));
-  const uint64_t count = point_account_.points();  // those that are not committed yet, too
-  const uint64_t known = std::min<uint64_t>(count - offset, coordinates.size() / dimension_);
-  WELLSPACE_RETURN_IF_ERROR(
-      CheckRepeatedPoints(*points_, dimension_, offset, coordinates.first(known * dimension_), name_));
-  coordinates = coordinates.subspan(known * dimension_);
-  if (coordinates.empty()) {
-    return absl::OkStatus();
-  }
-  WELLSPACE_RETURN_IF_ERROR(CheckPoints(BoxLocked(), dimension_, count, coordinates));
-  WELLSPACE_RETURN_IF_ERROR(point_account_.Take(coordinates.size() / dimension_));
-  if (absl::Status appended = RunGuarded([&] { return points_->Append(coordinates); }); !appended.ok()) {
-    point_account_.Return(coordinates.size() / dimension_);
-    return appended;
-  }
-  if (log_.is_durable()) {
-    uncommitted_crc32c_ = ExtendCrc32c(uncommitted_crc32c_, coordinates.data(), coordinates.size_bytes());
-    return absl::OkStatus();
-  }
-  NotePointsLocked(PointCountLocked());
-  return absl::OkStatus();
-}
-
-void Session::DropUncommittedLocked() {
-  point_account_.Return(PointCountLocked() - committed_points_);
-  points_->Truncate(committed_points_ * dimension_);
-  uncommitted_crc32c_ = 0;
+  return log_.is_durable() ? absl::OkStatus() : CommitPoints();
 }
 
 uint64_t Session::UncommittedBytes() const {
-  std::lock_guard lock(mutex_);
-  return (PointCountLocked() - committed_points_) * dimension_ * sizeof(double);
+  absl::MutexLock lock(&mutex_);
+  return (stores_.point_count() - state_->record.points()) * dimension() * sizeof(double);
 }
 
 absl::Status Session::CommitPoints() {
-  std::lock_guard change_lock(change_mutex_);
-  uint64_t end = 0;
+  absl::MutexLock change_lock(&change_mutex_);
+  SessionChange change;
+  std::shared_ptr<PointStore> points;
   uint32_t crc32c = 0;
   {
-    std::lock_guard lock(mutex_);
+    absl::MutexLock lock(&mutex_);
     // While points are removed, all that are left are copied, and committed then.
-    if (!HasUncommittedLocked() || busy_ == Busy::kRemovingPoints) {
+    if (stores_.point_count() == state_->record.points() || occupancy_.busy == Busy::kRemovingPoints) {
       return absl::OkStatus();
     }
-    end = PointCountLocked();
-    crc32c = std::exchange(uncommitted_crc32c_, 0);  // from now on, of the points behind these
+    change = PointsChange(*state_, stores_.appended());
+    points = stores_.points;
+    crc32c = std::exchange(stores_.new_crc32c, 0);  // from now on, of the points behind these
   }
-  absl::Status status = points_->Synchronize();
+  absl::Status status = points->Synchronize();
   if (status.ok()) {
-    status = CommitState([&](SessionChange& change) { AddPointsTo(change, end, crc32c); });
+    status = Make(change, [] {});
   }
-  std::lock_guard lock(mutex_);
-  if (!status.ok()) {
-    if (busy_ == Busy::kAddingVertices || busy_ == Busy::kReplaying) {
-      uncommitted_crc32c_ = crc32c;  // others read the points now; the next change tries to commit these, too
-    } else {
-      DropUncommittedLocked();
-    }
+  if (status.ok()) {
     return status;
   }
-  NotePointsLocked(end);
-  return absl::OkStatus();
-}
-
-v1::UploadPointsResponse Session::Committed() const {
-  v1::UploadPointsResponse message;
-  std::lock_guard lock(mutex_);
-  message.set_committed_points(committed_points_);
-  message.set_revision(revision_);
-  return message;
+  absl::MutexLock lock(&mutex_);
+  if (occupancy_.busy == Busy::kAddingVertices || occupancy_.busy == Busy::kReplaying) {
+    stores_.new_crc32c = crc32c;  // others read the points now; the next change tries to commit these, too
+    return status;
+  }
+  account_.Return(stores_.point_count() - state_->record.points());
+  stores_.points->Truncate(state_->record.points() * dimension());
+  stores_.new_crc32c = 0;
+  return status;
 }
 
 }  // namespace wellspace::server

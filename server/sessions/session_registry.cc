@@ -29,8 +29,12 @@ SessionRegistry::SessionRegistry(const ServiceOptions& options, MemoryBudget& me
 
 absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Create(NewSession settings,
                                                                  const AnswerTo<v1::Session>& answer) {
-  WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Session> session, Prepare(std::move(settings)));
-  absl::Status logged = RunGuarded([&] { return session->LogCreation(answer); });  // without a lock: it takes long
+  SessionChange creation;
+  WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Session> session, Prepare(std::move(settings), &creation));
+  absl::Status logged = RunGuarded([&] {  // without a lock: it takes long
+    creation.answer = AnswerRecordOf(answer, session->Describe());
+    return log_.is_durable() ? log_.Commit(creation) : absl::OkStatus();
+  });
   std::lock_guard lock(mutex_);
   --tenants_[session->tenant()].pending;
   --pending_;
@@ -42,7 +46,7 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Create(NewSession sett
   return session;
 }
 
-absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Prepare(NewSession settings) {
+absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Prepare(NewSession settings, SessionChange* creation) {
   std::lock_guard lock(mutex_);
   const auto known = tenants_.find(settings.tenant);
   const size_t count = known == tenants_.end() ? 0 : known->second.sessions.size() + known->second.pending;
@@ -55,17 +59,21 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Prepare(NewSession set
     return MakeError(v1::ERROR_REASON_TOO_MANY_SESSIONS,
                      absl::StrCat("this server has ", by_name_.size() + pending_, " sessions, as many as it may have"));
   }
-  Tenant& tenant = tenants_[settings.tenant];
+  last_create_time_ = std::max(clock_.wall(), last_create_time_ + absl::Microseconds(1));
+  *creation = CreationChange({.tenant = std::move(settings.tenant),
+                              .name = make_name_(),
+                              .parameters = std::move(settings.parameters),
+                              .labels = std::move(settings.labels),
+                              .ttl = settings.ttl,
+                              .create_time = last_create_time_});
+  // A session that is new is one that has had no change but this.
+  const StoredSession created{.state = *creation->state, .steps = {}, .operations = {}};
+  Tenant& tenant = tenants_[created.state.tenant()];
+  WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Session> session,
+                             Session::Restore(created, options_, memory_, clock_, tenant.points, log_));
   ++tenant.pending;
   ++pending_;
-  last_create_time_ = std::max(clock_.wall(), last_create_time_ + absl::Microseconds(1));
-  return std::make_shared<Session>(Session::Settings{.tenant = std::move(settings.tenant),
-                                                     .name = make_name_(),
-                                                     .parameters = std::move(settings.parameters),
-                                                     .labels = std::move(settings.labels),
-                                                     .ttl = settings.ttl,
-                                                     .create_time = last_create_time_},
-                                   options_, memory_, clock_, tenant.points, log_);
+  return session;
 }
 
 absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Restore(const StoredSession& stored) {
@@ -118,7 +126,7 @@ std::vector<std::shared_ptr<Session>> SessionRegistry::List(const std::string& t
   }
   std::vector<std::shared_ptr<Session>> listed;
   for (const std::shared_ptr<Session>& session : sessions) {
-    if (listed.size() < count && session->HasLabels(labels) && !session->IsExpired()) {
+    if (listed.size() < count && HasLabels(*session->state(), labels) && !session->IsExpired()) {
       listed.push_back(session);
     }
   }

@@ -91,8 +91,8 @@ class SessionRegistry {
     size_t pending = 0;                                       // that are being written down
   };
 
-  // A session that has its place, but is not shown yet.
-  absl::StatusOr<std::shared_ptr<Session>> Prepare(NewSession settings);
+  // A session that has its place, but is not shown yet; and the change that is to be committed of it.
+  absl::StatusOr<std::shared_ptr<Session>> Prepare(NewSession settings, SessionChange* creation);
 
   // The following want mutex_ to be held.
   void Publish(const std::shared_ptr<Session>& session);

@@ -14,108 +14,150 @@ namespace {
 
 constexpr uint64_t kCopiedPoints = uint64_t{1} << 16;  // at a time
 
-}  // namespace
-
-absl::Status Session::CheckRemovableLocked(std::span<const uint64_t> numbers) const {
+// Refuses ascending `numbers` that are not all points of `session`, which has `count`, or of which segments are made.
+absl::Status CheckRemovable(std::span<const uint64_t> numbers, uint64_t count, const FeatureStore& features,
+                            const std::string& session) {
   if (numbers.empty()) {
     return absl::OkStatus();
   }
   const auto refusal = [&](const std::string& what) {
     return MakeError(v1::ERROR_REASON_INVALID_POINTS, what, "points");
   };
-  const uint64_t count = PointCountLocked();
   if (numbers.back() >= count) {
-    return refusal(absl::StrCat("points has ", numbers.back(), ", and no point of ", name_, " has this number; it has ",
-                                count, ", from 0 on"));
+    return refusal(absl::StrCat("points has ", numbers.back(), ", and no point of ", session,
+                                " has this number; it has ", count, ", from 0 on"));
   }
   if (const auto twice = std::ranges::adjacent_find(numbers); twice != numbers.end()) {
     return refusal(absl::StrCat("points has ", *twice, " twice; each number is accepted once"));
   }
-  const std::span<const uint32_t> ends = features_.ends();
+  const std::span<const uint32_t> ends = features.ends();
   if (const auto last = std::ranges::max_element(ends); last != ends.end() && numbers.front() <= *last) {
-    return refusal(absl::StrCat("points has ", numbers.front(), ", but segments of ", name_, " end at points up to ",
+    return refusal(absl::StrCat("points has ", numbers.front(), ", but segments of ", session, " end at points up to ",
                                 *last, "; those behind can be removed"));
   }
   return absl::OkStatus();
 }
 
-absl::Status Session::BeginRemoval(std::span<const uint64_t> numbers, uint64_t expected_revision) {
-  std::lock_guard change_lock(change_mutex_);
-  WELLSPACE_RETURN_IF_ERROR(LoadInputs());
-  std::lock_guard lock(mutex_);
-  WELLSPACE_RETURN_IF_ERROR(CheckReadyForChangeLocked(expected_revision));
-  if (is_uploading_) {
-    return MakeError(v1::ERROR_REASON_SESSION_BUSY,
-                     absl::StrCat("points are being uploaded to ", name_, "; wait for the end of the upload"));
-  }
-  WELLSPACE_RETURN_IF_ERROR(CheckRemovableLocked(numbers));
-  BeginBusyLocked(Busy::kRemovingPoints);
-  return absl::OkStatus();
-}
-
-absl::Status Session::CopyPointsWithout(std::span<const uint64_t> numbers, KeptPoints* kept) {
-  const uint64_t count = points_->coordinate_count() / dimension_;
-  if (points_->is_in_memory()) {
-    const uint64_t bytes = (count - numbers.size()) * dimension_ * sizeof(double);
-    WELLSPACE_ASSIGN_OR_RETURN(kept->memory, memory_.Reserve(bytes, "the points that are left of a session"));
-  }
-  kept->file = revision_ + 1;
-  kept->store = log_.OpenPoints(name_, dimension_, kept->file, {});
+// Appends all points of `from` but those with these ascending `numbers` to `to`, and synchronises it. `*crc32c` becomes
+// their checksum.
+absl::Status CopyWithout(const PointStore& from, int dimension, std::span<const uint64_t> numbers, PointStore& to,
+                         uint32_t* crc32c) {
+  const uint64_t count = from.coordinate_count() / dimension;
   auto removed = numbers.begin();
   for (uint64_t first = 0; first < count; first += kCopiedPoints) {
     const uint64_t end = std::min(count, first + kCopiedPoints);
     WELLSPACE_ASSIGN_OR_RETURN(std::vector<double> block,
-                               points_->Copy(first * dimension_, end * dimension_, core::RunContext()));
-    auto to = block.begin();
+                               from.Copy(first * dimension, end * dimension, core::RunContext()));
+    auto kept = block.begin();
     for (uint64_t point = first; point < end; ++point) {
       if (removed != numbers.end() && *removed == point) {
         ++removed;
       } else {
-        to = std::copy_n(block.begin() + static_cast<std::ptrdiff_t>((point - first) * dimension_), dimension_, to);
+        kept = std::copy_n(block.begin() + static_cast<std::ptrdiff_t>((point - first) * dimension), dimension, kept);
       }
     }
-    block.erase(to, block.end());
-    WELLSPACE_RETURN_IF_ERROR(kept->store->Append(block));
-    kept->crc32c = ExtendCrc32c(kept->crc32c, block.data(), block.size() * sizeof(double));
+    block.erase(kept, block.end());
+    WELLSPACE_RETURN_IF_ERROR(to.Append(block));
+    *crc32c = ExtendCrc32c(*crc32c, block.data(), block.size() * sizeof(double));
   }
-  return kept->store->Synchronize();
+  return to.Synchronize();
 }
 
-absl::StatusOr<PointsLeft> Session::CommitRemoval(KeptPoints& kept, const AnswerTo<PointsLeft>& answer) {
-  std::lock_guard change_lock(change_mutex_);
-  const PointsLeft left{.points = kept.store->coordinate_count() / dimension_, .revision = kept.file};
-  const std::optional<store::v1::AnswerRecord> answer_record = AnswerRecordOf(answer, left);
-  const std::vector<SizesInUse> unused = UnusedSizesLocked({}, sizes_in_use_.number);
-  WELLSPACE_RETURN_IF_ERROR(CommitState([&](SessionChange& change) {
-    change.steps.emplace_back().mutable_removed();
-    if (left.points > 0) {
-      store::v1::StepRecord::Points& points = *change.steps.emplace_back().mutable_points();
-      points.set_count(left.points);
-      points.set_crc32c(kept.crc32c);
-    }
-    change.state->set_points(left.points);
-    change.state->set_points_file(kept.file);
-    change.state->set_revision(left.revision);
-    change.state->set_is_ready(false);
-    for (const SizesInUse& set : unused) {
-      change.dropped_sizes.push_back(set.number);
-    }
-    change.answer = answer_record;
-  }));
-  std::lock_guard lock(mutex_);
-  point_account_.Return(PointCountLocked() - left.points);
-  for (const SizesInUse& set : unused) {
-    point_account_.ReturnSizes(set.count);
+}  // namespace
+
+// One RemovePoints: its parts, in their order.
+class PointRemoval {
+ public:
+  // `numbers` are ascending.
+  PointRemoval(Session& session, std::span<const uint64_t> numbers) : session_(session), numbers_(numbers) {}
+
+  // What it does before it copies points; makes the session Busy::kRemovingPoints.
+  absl::Status Begin(uint64_t expected_revision);
+  // Writes the points that are left to a store of their own, and commits that.
+  absl::Status Remove(const AnswerTo<PointsLeft>& answer);
+  // The session is free again. Returns what it has.
+  PointsLeft End();
+
+ private:
+  absl::Status Commit(const AnswerTo<PointsLeft>& answer);
+
+  Session& session_;
+  const std::span<const uint64_t> numbers_;
+  SessionWork work_;  // of the session; the structure goes with its points
+  PointsThatAreLeft left_;
+  MemoryReservation memory_;           // that the copy takes besides, if it is in memory
+  std::shared_ptr<PointStore> store_;  // of what is left; once the change is made, that of before; null: not begun
+  uint64_t store_file_ = 0;            // its number
+};
+
+absl::Status PointRemoval::Begin(uint64_t expected_revision) {
+  absl::MutexLock change_lock(&session_.change_mutex_);
+  WELLSPACE_RETURN_IF_ERROR(session_.LoadInputs());
+  absl::MutexLock lock(&session_.mutex_);
+  WELLSPACE_RETURN_IF_ERROR(
+      CheckReady(session_.occupancy_, *session_.state_, session_.stores_.point_count(), expected_revision));
+  if (session_.occupancy_.is_uploading) {
+    return MakeError(v1::ERROR_REASON_SESSION_BUSY, absl::StrCat("points are being uploaded to ", session_.name(),
+                                                                 "; wait for the end of the upload"));
   }
-  std::swap(points_, kept.store);
-  std::swap(points_file_, kept.file);
-  committed_points_ = left.points;
-  uncommitted_crc32c_ = 0;
-  revision_ = left.revision;
-  is_ready_ = false;
-  steps_ = SessionSteps();
-  work_.meshed_points = 0;
-  ++structure_version_;
+  WELLSPACE_RETURN_IF_ERROR(
+      CheckRemovable(numbers_, session_.stores_.point_count(), *session_.stores_.features, session_.name()));
+  session_.occupancy_.BeginBusy(Busy::kRemovingPoints);
+  session_.mutex_.Await(absl::Condition(HasNoQueries, &session_.occupancy_));
+  return absl::OkStatus();
+}
+
+absl::Status PointRemoval::Remove(const AnswerTo<PointsLeft>& answer) {
+  const SessionInputs inputs = session_.inputs();
+  const int dimension = session_.dimension();
+  left_ = {.points = inputs.point_count() - numbers_.size(), .file = NextRevision(*inputs.state)};
+  if (inputs.points->is_in_memory()) {
+    const uint64_t bytes = left_.points * dimension * sizeof(double);
+    WELLSPACE_ASSIGN_OR_RETURN(memory_, session_.memory_.Reserve(bytes, "the points that are left of a session"));
+  }
+  store_file_ = left_.file;
+  store_ = session_.log_.OpenPoints(session_.name(), dimension, store_file_, {});
+  WELLSPACE_RETURN_IF_ERROR(CopyWithout(*inputs.points, dimension, numbers_, *store_, &left_.crc32c));
+  WELLSPACE_RETURN_IF_ERROR(Commit(answer));
+  work_.mesher = nullptr;
+  work_.memory.Release();
+  return absl::OkStatus();
+}
+
+absl::Status PointRemoval::Commit(const AnswerTo<PointsLeft>& answer) {
+  absl::MutexLock change_lock(&session_.change_mutex_);
+  const std::shared_ptr<const SessionState> before = session_.state();
+  SessionChange change = RemovalChange(*before, left_);
+  change.answer = AnswerRecordOf(answer, PointsLeft{.points = left_.points, .revision = left_.file});
+  SizeSets unused;  // is freed without the lock
+  return session_.Make(change, [&] {
+    session_.mutex_.AssertHeld();
+    Session::Stores& stores = session_.stores_;
+    session_.account_.Return(session_.stores_.point_count() - left_.points);
+    for (const uint64_t number : change.dropped_sizes) {
+      auto set = stores.sizes.extract(number);
+      session_.account_.ReturnSizes(set.mapped()->sizes.size());
+      unused.insert(std::move(set));
+    }
+    std::swap(stores.points, store_);
+    store_file_ = before->record.points_file();
+    stores.new_crc32c = 0;
+    work_ = session_.work_.TakeMesher();
+  });
+}
+
+PointsLeft PointRemoval::End() {
+  PointsLeft left;
+  {
+    absl::MutexLock lock(&session_.mutex_);
+    session_.occupancy_.EndBusy(session_.clock_.since_boot());
+    left = {.points = session_.state_->record.points(), .revision = session_.state_->record.revision()};
+  }
+  // The store that the session has no more, or has not come to have.
+  if (std::exchange(store_, nullptr) != nullptr) {
+    session_.log_.DropPoints(session_.name(), store_file_);
+  }
+  session_.NoteIdle();
   return left;
 }
 
@@ -123,28 +165,10 @@ absl::StatusOr<PointsLeft> Session::RemovePoints(std::span<const uint64_t> numbe
                                                  const AnswerTo<PointsLeft>& answer) {
   std::vector<uint64_t> ascending(numbers.begin(), numbers.end());
   std::ranges::sort(ascending);
-  WELLSPACE_RETURN_IF_ERROR(BeginRemoval(ascending, expected_revision));
-  WaitForQueries();
-  KeptPoints kept;
-  PointsLeft left{.points = committed_points_, .revision = revision_};
-  const absl::Status status = RunGuarded([&]() -> absl::Status {
-    if (!ascending.empty()) {
-      WELLSPACE_RETURN_IF_ERROR(CopyPointsWithout(ascending, &kept));
-      WELLSPACE_ASSIGN_OR_RETURN(left, CommitRemoval(kept, answer));
-      DropMesher();
-    }
-    return absl::OkStatus();
-  });
-  {
-    std::lock_guard lock(mutex_);
-    EndBusyLocked();
-  }
-  // The store that the session has no more, or has not come to have.
-  if (kept.store != nullptr) {
-    kept.store = nullptr;
-    log_.DropPoints(name_, kept.file);
-  }
-  NoteIdle();
+  PointRemoval removal(*this, ascending);
+  WELLSPACE_RETURN_IF_ERROR(removal.Begin(expected_revision));
+  const absl::Status status = RunGuarded([&] { return ascending.empty() ? absl::OkStatus() : removal.Remove(answer); });
+  const PointsLeft left = removal.End();
   if (!status.ok()) {
     return status;
   }

@@ -2,12 +2,11 @@
 #ifndef WELLSPACE_SERVER_SESSIONS_SESSION_STEPS_H_
 #define WELLSPACE_SERVER_SESSIONS_SESSION_STEPS_H_
 
+#include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <vector>
 
-#include "core/geometry/criterion.h"
 #include "core/mesh_parameters.h"
 
 namespace wellspace::server {
@@ -25,38 +24,46 @@ struct SizesInUse {
 struct SessionStep {
   uint64_t uploads_end = 0;  // of the session's points, the first that was not taken in as an upload
   uint64_t end = 0;  // the first that is not in the structure after the step; those from uploads_end on were added
-  std::shared_ptr<const core::MeshParameters> refined_with;  // null: vertices were added
-  SizesInUse sizes;                                          // those of refined_with
+  // Without sizes at points, which `sizes` names; null: vertices were added.
+  std::shared_ptr<const core::MeshParameters> refined_with;
+  SizesInUse sizes;
 };
 
-// The steps of a session that succeeded, in their order. Structure and mesh are a function of these and of the points:
-// Replay (server/sessions/replay.h) computes it. What did not succeed is no step. They are as well in the SessionLog.
+// The steps of a session that succeeded, in their order. Structure and mesh are a function of these, of the points, the
+// features and the sizes: Replay (server/sessions/replay.h) computes it. What did not succeed is no step. They are as
+// well in the SessionLog.
+//
+// A value. Copies share all but the last steps, so that a session with many additions is as cheap to change as others.
 //
 // Thread safety: thread-compatible.
-// Invariants: (1) the first step is a refinement; (2) steps[i].end <= steps[i + 1].uploads_end <= steps[i + 1].end.
+// Invariants: (1) the first step is a refinement; (2) the end of a step <= the uploads_end of the next one <= its end.
 class SessionSteps {
  public:
-  // `points` of the session are meshed now, after a refinement with `parameters`.
-  // `sizes` says which sizes at points `parameters` have, or, before ResolveSizes, will have.
-  void NoteRefinement(uint64_t points, const core::MeshParameters& parameters, SizesInUse sizes);
+  // `points` of the session are meshed now, after a refinement with `parameters` and `sizes`.
+  void NoteRefinement(uint64_t points, std::shared_ptr<const core::MeshParameters> parameters, SizesInUse sizes);
   // Those before number `uploads_end` came by uploads, those up to `end` were added as vertices.
   //
   // REQUIRES:   there was a refinement.
   void NoteAddition(uint64_t uploads_end, uint64_t end);
 
-  // Gives the refinements their sizes at points, which `find` has by the number of the set.
-  void ResolveSizes(const std::function<std::shared_ptr<const core::SizeSamples>(uint64_t number)>& find);
-
   // The sets of sizes of all refinements, each once, ascending by number.
   std::vector<SizesInUse> sizes() const;
 
-  const std::vector<SessionStep>& all() const { return steps_; }
-  bool empty() const { return steps_.empty(); }
+  // All of them. Complexity: O(steps).
+  std::vector<SessionStep> all() const;
+  size_t count() const { return blocks_.size() * kBlock + rest_.size(); }
+  bool empty() const { return count() == 0; }
   // Of the session's points, those that the structure has.
-  uint64_t points() const { return steps_.empty() ? 0 : steps_.back().end; }
+  uint64_t points() const;
 
  private:
-  std::vector<SessionStep> steps_;
+  using Block = std::vector<SessionStep>;
+  static constexpr size_t kBlock = 256;  // steps
+
+  void Add(SessionStep step);
+
+  std::vector<std::shared_ptr<const Block>> blocks_;  // of kBlock steps each
+  Block rest_;                                        // behind them, fewer than kBlock
 };
 
 }  // namespace wellspace::server

@@ -42,214 +42,245 @@ absl::Status CheckNear(std::span<const uint32_t> near, const core::Mesher& meshe
 
 absl::Status Session::PrepareStructure(uint64_t expected_revision, const MesherFactory& create_mesher, Job& job,
                                        bool* is_at_work) {
+  std::shared_ptr<const MeshSnapshot> last_mesh;
   {
-    std::lock_guard change_lock(change_mutex_);
+    absl::MutexLock change_lock(&change_mutex_);
     WELLSPACE_RETURN_IF_ERROR(LoadInputs());
-    std::lock_guard lock(mutex_);
+    absl::MutexLock lock(&mutex_);
     if (is_at_work != nullptr) {
-      *is_at_work = busy_ == Busy::kReplaying && !is_closed_;
+      *is_at_work = occupancy_.busy == Busy::kReplaying && !occupancy_.is_closed;
     }
-    WELLSPACE_RETURN_IF_ERROR(CheckReadyForChangeLocked(expected_revision));
-    WELLSPACE_RETURN_IF_ERROR(CheckStepsLocked());
+    WELLSPACE_RETURN_IF_ERROR(CheckReady(occupancy_, *state_, stores_.point_count(), expected_revision));
+    WELLSPACE_RETURN_IF_ERROR(CheckSteps(*state_));
     if (work_.mesher != nullptr) {
       return absl::OkStatus();
     }
-    BeginBusyLocked(Busy::kReplaying);
+    occupancy_.BeginBusy(Busy::kReplaying);
+    last_mesh = work_.mesh;
   }
-  const absl::Status status = RunGuarded([&] { return Rebuild(create_mesher, job); });
+  SessionWork built;
+  const absl::Status status = RunGuarded([&] {
+    const SessionInputs inputs = this->inputs();
+    WELLSPACE_ASSIGN_OR_RETURN(built.mesher, Replay(inputs, *last_mesh, create_mesher, job));
+    built.memory = job.TakeMemory(built.mesher->memory_bytes());
+    built.memory.MakeLasting(inputs.lasts);
+    return absl::OkStatus();
+  });
   job.TakeMemory(std::numeric_limits<uint64_t>::max()).Release();
   {
-    std::lock_guard lock(mutex_);
-    EndBusyLocked();
+    absl::MutexLock lock(&mutex_);
+    work_.mesher = std::move(built.mesher);
+    work_.memory = std::move(built.memory);
+    occupancy_.EndBusy(clock_.since_boot());
   }
   NoteIdle();
   return status;
 }
 
 Session::Size Session::GetSize(uint64_t few) const {
-  std::lock_guard lock(mutex_);
+  absl::MutexLock lock(&mutex_);
   Size size;
-  size.points = PointCountLocked();
-  size.segments = feature_summary_.segments;
+  size.points = stores_.point_count();
+  size.segments = state_->record.segments();
   if (size.points <= few) {
-    size.some_points = points_->CopyFrom(0, core::RunContext()).value_or(std::vector<double>());
+    size.some_points = stores_.points->CopyFrom(0, core::RunContext()).value_or(std::vector<double>());
   }
-  if (work_.mesh != nullptr) {
-    size.vertices = work_.mesh->figures().vertices;
+  if (CheckMesh(*state_).ok()) {
+    size.vertices = state_->record.mesh().vertices();
+    size.has_locator = locator_.Has(state_->record.mesh().revision());
     // While vertices are added, or points removed, the mesher is theirs, and not looked at.
-    const bool may_look = busy_ == Busy::kNo || busy_ == Busy::kStarting || busy_ == Busy::kOperation;
-    const bool is_given_up = busy_ == Busy::kReplaying || (may_look && work_.mesher == nullptr);
-    size.replayed_steps = is_given_up ? steps_.all().size() : 0;
+    const bool is_theirs = occupancy_.busy == Busy::kAddingVertices || occupancy_.busy == Busy::kRemovingPoints;
+    size.replayed_steps = !is_theirs && work_.mesher == nullptr ? state_->steps.count() : 0;
   }
   return size;
 }
 
-absl::Status Session::Rebuild(const MesherFactory& create_mesher, Job& job) {
-  WELLSPACE_ASSIGN_OR_RETURN(work_.mesher, Replay(steps_, *points_, features_, *work_.mesh, create_mesher, job));
-  work_.memory = job.TakeMemory(work_.mesher->memory_bytes());
-  work_.memory.MakeLasting(MesherLasts());
-  return absl::OkStatus();
-}
-
-absl::StatusOr<std::shared_ptr<const MeshSnapshot>> Session::MeshAt(uint64_t revision) const {
-  std::lock_guard lock(mutex_);
-  WELLSPACE_RETURN_IF_ERROR(CheckOpenLocked());
-  WELLSPACE_RETURN_IF_ERROR(CheckMeshLocked());
-  if (revision != 0 && revision != work_.mesh->revision()) {
-    return MakeError(v1::ERROR_REASON_REVISION_MISMATCH,
-                     absl::StrCat("revision is ", revision, ", but the mesh of ", name_, " is of revision ",
-                                  work_.mesh->revision()));
-  }
-  return work_.mesh;
-}
-
-bool Session::HasLocator() const {
-  std::lock_guard lock(mutex_);
-  return work_.mesh != nullptr && locator_.Has(work_.mesh->revision());
-}
-
 absl::StatusOr<std::shared_ptr<const LocatedMesh>> Session::PrepareLocator(uint64_t revision, Job& job) {
-  return locator_.Prepare([&] { return MeshAt(revision); }, MesherLasts(), job);
+  const auto mesh = [&]() -> absl::StatusOr<std::shared_ptr<const MeshSnapshot>> {
+    absl::MutexLock lock(&mutex_);
+    WELLSPACE_RETURN_IF_ERROR(CheckOpen(occupancy_, name()));
+    WELLSPACE_RETURN_IF_ERROR(CheckMesh(*state_));
+    if (revision != 0 && revision != work_.mesh->revision()) {
+      return MakeError(v1::ERROR_REASON_REVISION_MISMATCH,
+                       absl::StrCat("revision is ", revision, ", but the mesh of ", name(), " is of revision ",
+                                    work_.mesh->revision()));
+    }
+    return work_.mesh;
+  };
+  return locator_.Prepare(mesh, inputs().lasts, job);
 }
 
-void Session::WaitForQueries() { std::unique_lock wait(queries_mutex_); }
+// One AddVertices: its parts, in their order.
+class VertexAddition {
+ public:
+  VertexAddition(Session& session, std::span<const double> points, std::span<const uint32_t> near)
+      : session_(session), points_(points), near_(near), count_(points.size() / session.dimension()) {}
 
-absl::Status Session::BeginAddition(std::span<const double> points, std::span<const uint32_t> near,
-                                    uint64_t expected_revision) {
-  std::lock_guard change_lock(change_mutex_);
-  std::lock_guard lock(mutex_);
-  WELLSPACE_RETURN_IF_ERROR(CheckReadyForChangeLocked(expected_revision));
-  WELLSPACE_RETURN_IF_ERROR(CheckStructureLocked());
-  if (points.size() % dimension_ != 0) {
+  // What it does before it touches the mesher, which it takes; makes the session Busy::kAddingVertices.
+  absl::Status Begin(uint64_t expected_revision);
+  // Has the mesher take the points in, and commits that. On an error the session has what it had; a mesher that has
+  // more is given up.
+  absl::StatusOr<AddedVertices> Add(core::RunContext& context, const AnswerTo<AddedVertices>& answer);
+  // The session is free again; `is_made`: what Add says.
+  void End(bool is_made);
+
+ private:
+  // The part that the mesher does. First it takes in the points that were uploaded since it was last refined.
+  absl::StatusOr<std::vector<uint32_t>> AddToMesher(core::RunContext& context);
+  // The log has them then.
+  absl::Status Commit(const AnswerTo<AddedVertices>& answer, AddedVertices* added);
+  void DropMesher() {
+    work_.mesher = nullptr;
+    work_.memory.Release();
+  }
+
+  Session& session_;
+  const std::span<const double> points_;
+  const std::span<const uint32_t> near_;
+  const uint64_t count_;
+  SessionWork work_;
+  uint64_t uploaded_ = 0;  // points that came by uploads, and were taken in
+};
+
+absl::Status VertexAddition::Begin(uint64_t expected_revision) {
+  absl::MutexLock change_lock(&session_.change_mutex_);
+  absl::MutexLock lock(&session_.mutex_);
+  const int dimension = session_.dimension();
+  WELLSPACE_RETURN_IF_ERROR(
+      CheckReady(session_.occupancy_, *session_.state_, session_.stores_.point_count(), expected_revision));
+  WELLSPACE_RETURN_IF_ERROR(CheckStructure(*session_.state_, session_.work_.mesher != nullptr));
+  if (points_.size() % dimension != 0) {
     return MakeError(
         v1::ERROR_REASON_INVALID_CHUNK_SHAPE,
-        absl::StrCat("there are ", points.size(), " coordinates; expected a multiple of the dimension ", dimension_),
+        absl::StrCat("there are ", points_.size(), " coordinates; expected a multiple of the dimension ", dimension),
         "points");
   }
-  if (!near.empty() && near.size() != points.size() / dimension_) {
-    return MakeError(v1::ERROR_REASON_INVALID_REQUEST,
-                     absl::StrCat("near has ", near.size(), " vertices for ", points.size() / dimension_,
-                                  " points; expected as many, or none"),
-                     "near");
+  if (!near_.empty() && near_.size() != count_) {
+    return MakeError(
+        v1::ERROR_REASON_INVALID_REQUEST,
+        absl::StrCat("near has ", near_.size(), " vertices for ", count_, " points; expected as many, or none"),
+        "near");
   }
-  WELLSPACE_RETURN_IF_ERROR(point_account_.Take(points.size() / dimension_));
-  BeginBusyLocked(Busy::kAddingVertices);
+  WELLSPACE_RETURN_IF_ERROR(session_.account_.Take(count_));
+  session_.occupancy_.BeginBusy(Busy::kAddingVertices);
+  session_.mutex_.Await(absl::Condition(HasNoQueries, &session_.occupancy_));
+  work_ = session_.work_.TakeMesher();
   return absl::OkStatus();
 }
 
-absl::StatusOr<AddedVertices> Session::AddVertices(std::span<const double> points, std::span<const uint32_t> near,
-                                                   uint64_t expected_revision, core::RunContext& context,
-                                                   const AnswerTo<AddedVertices>& answer) {
-  WELLSPACE_RETURN_IF_ERROR(BeginAddition(points, near, expected_revision));
-  WaitForQueries();
-  uint64_t uploaded = 0;
+absl::StatusOr<AddedVertices> VertexAddition::Add(core::RunContext& context, const AnswerTo<AddedVertices>& answer) {
   bool has_returned = false;
   AddedVertices added;
   absl::Status status = RunGuarded([&] {
-    absl::StatusOr<std::vector<uint32_t>> vertices = AddToMesher(points, near, context, &uploaded);
+    absl::StatusOr<std::vector<uint32_t>> vertices = AddToMesher(context);
     has_returned = true;
     WELLSPACE_ASSIGN_OR_RETURN(added.vertices, std::move(vertices));
     return absl::OkStatus();
   });
-  if (!has_returned || (!status.ok() && uploaded > 0)) {
+  if (!has_returned || (!status.ok() && uploaded_ > 0)) {
     // An exception leaves a mesher in an unknown state; else points that waited are in it, which would come with
     // others.
     DropMesher();
-  } else if (memory_.is_limited()) {
+  } else if (session_.memory_.is_limited()) {
     // What was reserved is more than was needed but for the most uneven points; those are counted by the next
     // refinement.
     (void)work_.memory.Resize(work_.mesher->memory_bytes());
   }
   if (status.ok()) {
-    status = RunGuarded([&] { return CommitAddition(points, uploaded, answer, &added); });
+    status = RunGuarded([&] { return Commit(answer, &added); });
     if (!status.ok()) {
       DropMesher();  // it has them
     }
   }
-  {
-    std::lock_guard lock(mutex_);
-    EndBusyLocked();
-    if (!status.ok()) {
-      point_account_.Return(points.size() / dimension_);
-    }
-  }
-  NoteIdle();
   if (!status.ok()) {
     return status;
   }
   return added;
 }
 
-void Session::DropMesher() {
-  work_.mesher = nullptr;
-  work_.memory.Release();
-}
-
-absl::Status Session::CommitAddition(std::span<const double> points, uint64_t uploaded,
-                                     const AnswerTo<AddedVertices>& answer, AddedVertices* added) {
-  // Of a session that is busy, what is read here changes with change_mutex_ held alone: by an upload that ends.
-  std::lock_guard change_lock(change_mutex_);
-  const uint64_t count = points.size() / dimension_;
-  if (uploaded == 0 && count == 0) {
-    added->revision = revision_;
-    return absl::OkStatus();
-  }
-  const uint64_t known = PointCountLocked();
-  const uint64_t uploads_end = work_.meshed_points + uploaded;
-  const bool grows = known + count > committed_points_;
-  added->revision = revision_ + (grows ? 1 : 0);
-  const std::optional<store::v1::AnswerRecord> answer_record = AnswerRecordOf(answer, *added);
-  const absl::Status status = RunGuarded([&]() -> absl::Status {
-    {
-      std::lock_guard lock(mutex_);
-      WELLSPACE_RETURN_IF_ERROR(points_->Append(points));
-    }
-    if (grows) {
-      WELLSPACE_RETURN_IF_ERROR(points_->Synchronize());
-    }
-    return CommitState([&](SessionChange& change) {
-      if (grows) {
-        AddPointsTo(change, known + count, ExtendCrc32c(uncommitted_crc32c_, points.data(), points.size_bytes()));
-      }
-      store::v1::StepRecord::Added& step = *change.steps.emplace_back().mutable_added();
-      step.set_uploads_end(uploads_end);
-      step.set_end(uploads_end + count);
-      change.answer = answer_record;
-    });
-  });
-  std::lock_guard lock(mutex_);
-  if (!status.ok()) {
-    points_->Truncate(known * dimension_);
-    return status;
-  }
-  steps_.NoteAddition(uploads_end, uploads_end + count);
-  work_.meshed_points = steps_.points();
-  ++structure_version_;
-  if (grows) {
-    uncommitted_crc32c_ = 0;
-    NotePointsLocked(known + count);
-  }
-  return absl::OkStatus();
-}
-
-absl::StatusOr<std::vector<uint32_t>> Session::AddToMesher(std::span<const double> points,
-                                                           std::span<const uint32_t> near, core::RunContext& context,
-                                                           uint64_t* uploaded) {
-  WELLSPACE_RETURN_IF_ERROR(ReserveForVertices(point_account_.points() - work_.meshed_points, memory_, work_));
+absl::StatusOr<std::vector<uint32_t>> VertexAddition::AddToMesher(core::RunContext& context) {
+  const SessionInputs inputs = session_.inputs();
+  const uint64_t meshed = inputs.state->steps.points();
+  core::Mesher& mesher = *work_.mesher;
+  WELLSPACE_RETURN_IF_ERROR(ReserveForVertices(inputs.point_count() + count_ - meshed, session_.memory_, work_));
   // Points that were uploaded since the last refinement come first: they have lower numbers.
   WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> waiting,
-                             points_->CopyFrom(work_.meshed_points * dimension_, context));
+                             inputs.points->CopyFrom(meshed * session_.dimension(), context));
   if (!waiting.empty()) {
     // What is wrong with the vertices shows before the mesher has taken in others, which would cost it.
-    WELLSPACE_RETURN_IF_ERROR(CheckNear(near, *work_.mesher, waiting.size() / dimension_));
-    WELLSPACE_RETURN_IF_ERROR(CheckPoints(BoxLocked(), dimension_, 0, points));
-    WELLSPACE_RETURN_IF_ERROR(work_.mesher->AddPoints(waiting, context).status());
-    *uploaded = waiting.size() / dimension_;
+    WELLSPACE_RETURN_IF_ERROR(CheckNear(near_, mesher, waiting.size() / session_.dimension()));
+    WELLSPACE_RETURN_IF_ERROR(CheckPoints(BoxOf(*inputs.state), session_.dimension(), 0, points_));
+    WELLSPACE_RETURN_IF_ERROR(mesher.AddPoints(waiting, context).status());
+    uploaded_ = waiting.size() / session_.dimension();
   }
-  absl::StatusOr<std::vector<uint32_t>> added = work_.mesher->AddPointsNear(points, near, context);
+  absl::StatusOr<std::vector<uint32_t>> added = mesher.AddPointsNear(points_, near_, context);
   if (added.status().code() == absl::StatusCode::kOutOfRange) {
     return MakeError(v1::ERROR_REASON_VERTEX_OUT_OF_RANGE, std::string(added.status().message()), "near");
   }
+  return added;
+}
+
+absl::Status VertexAddition::Commit(const AnswerTo<AddedVertices>& answer, AddedVertices* added) {
+  absl::MutexLock change_lock(&session_.change_mutex_);
+  const std::shared_ptr<const SessionState> before = session_.state();
+  added->revision = before->record.revision();
+  if (uploaded_ == 0 && count_ == 0) {
+    return absl::OkStatus();
+  }
+  SessionChange change;
+  std::shared_ptr<PointStore> store;
+  uint64_t known = 0;
+  {
+    absl::MutexLock lock(&session_.mutex_);
+    store = session_.stores_.points;
+    known = session_.stores_.point_count();
+    const uint32_t crc32c = ExtendCrc32c(session_.stores_.new_crc32c, points_.data(), points_.size_bytes());
+    change =
+        AdditionChange(*before, {.end = known + count_, .crc32c = crc32c}, before->steps.points() + uploaded_, count_);
+    added->revision = change.state->revision();
+  }
+  change.answer = AnswerRecordOf(answer, *added);
+  const absl::Status status = RunGuarded([&]() -> absl::Status {
+    {
+      absl::MutexLock lock(&session_.mutex_);
+      WELLSPACE_RETURN_IF_ERROR(store->Append(points_));
+    }
+    if (change.state->points() > before->record.points()) {
+      WELLSPACE_RETURN_IF_ERROR(store->Synchronize());
+    }
+    session_.change_mutex_.AssertHeld();
+    return session_.Make(change, [&] {
+      session_.mutex_.AssertHeld();
+      session_.stores_.new_crc32c = 0;
+    });
+  });
+  if (!status.ok()) {
+    absl::MutexLock lock(&session_.mutex_);
+    store->Truncate(known * session_.dimension());
+  }
+  return status;
+}
+
+void VertexAddition::End(bool is_made) {
+  {
+    absl::MutexLock lock(&session_.mutex_);
+    session_.work_.mesher = std::move(work_.mesher);
+    session_.work_.memory = std::move(work_.memory);
+    if (!is_made) {
+      session_.account_.Return(count_);
+    }
+    session_.occupancy_.EndBusy(session_.clock_.since_boot());
+  }
+  session_.NoteIdle();
+}
+
+absl::StatusOr<AddedVertices> Session::AddVertices(std::span<const double> points, std::span<const uint32_t> near,
+                                                   uint64_t expected_revision, core::RunContext& context,
+                                                   const AnswerTo<AddedVertices>& answer) {
+  VertexAddition addition(*this, points, near);
+  WELLSPACE_RETURN_IF_ERROR(addition.Begin(expected_revision));
+  absl::StatusOr<AddedVertices> added = addition.Add(context, answer);
+  addition.End(added.ok());
   return added;
 }
 

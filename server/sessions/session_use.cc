@@ -1,29 +1,39 @@
 #include "server/sessions/session_use.h"
 
-#include <mutex>
 #include <utility>
 
 namespace wellspace::server {
 
 SessionUse::SessionUse(std::shared_ptr<Session> session) : session_(std::move(session)) {
-  std::lock_guard lock(session_->mutex_);
-  session_->lease_.BeginUse();
+  absl::MutexLock lock(&session_->mutex_);
+  session_->occupancy_.lease.BeginUse();
 }
 
 SessionUse::~SessionUse() {
-  std::lock_guard lock(session_->mutex_);
-  session_->lease_.EndUse(session_->clock_.since_boot());
+  absl::MutexLock lock(&session_->mutex_);
+  session_->occupancy_.lease.EndUse(session_->clock_.since_boot());
+}
+
+std::unique_ptr<UploadUse> UploadUse::Begin(std::shared_ptr<Session> session) {
+  absl::MutexLock lock(&session->mutex_);
+  return std::exchange(session->occupancy_.is_uploading, true) ? nullptr
+                                                               : std::unique_ptr<UploadUse>(new UploadUse(session));
+}
+
+UploadUse::~UploadUse() {
+  absl::MutexLock lock(&session_->mutex_);
+  session_->occupancy_.is_uploading = false;
 }
 
 StructureUse::StructureUse(std::shared_ptr<Session> session) : session_(std::move(session)) {
-  std::lock_guard lock(session_->mutex_);
-  ++session_->structure_uses_;
+  absl::MutexLock lock(&session_->mutex_);
+  ++session_->occupancy_.structure_uses;
 }
 
 StructureUse::~StructureUse() {
   {
-    std::lock_guard lock(session_->mutex_);
-    --session_->structure_uses_;
+    absl::MutexLock lock(&session_->mutex_);
+    --session_->occupancy_.structure_uses;
   }
   session_->NoteIdle();
 }

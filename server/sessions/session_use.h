@@ -1,8 +1,9 @@
-// What keeps a session, or its structure, for as long as it is used.
+// What keeps a session, its uploads or its structure, for as long as it is used.
 #ifndef WELLSPACE_SERVER_SESSIONS_SESSION_USE_H_
 #define WELLSPACE_SERVER_SESSIONS_SESSION_USE_H_
 
 #include <memory>
+#include <utility>
 
 #include "server/sessions/session.h"
 
@@ -20,6 +21,21 @@ class SessionUse {
   const std::shared_ptr<Session>& session_ptr() const { return session_; }
 
  private:
+  const std::shared_ptr<Session> session_;
+};
+
+// Keeps other uploads from a session.
+class UploadUse {
+ public:
+  // Null: another upload has it.
+  static std::unique_ptr<UploadUse> Begin(std::shared_ptr<Session> session);
+  ~UploadUse();
+  UploadUse(const UploadUse&) = delete;
+  UploadUse& operator=(const UploadUse&) = delete;
+
+ private:
+  explicit UploadUse(std::shared_ptr<Session> session) : session_(std::move(session)) {}
+
   const std::shared_ptr<Session> session_;
 };
 

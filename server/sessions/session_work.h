@@ -2,8 +2,8 @@
 #ifndef WELLSPACE_SERVER_SESSIONS_SESSION_WORK_H_
 #define WELLSPACE_SERVER_SESSIONS_SESSION_WORK_H_
 
-#include <cstdint>
 #include <memory>
+#include <utility>
 
 #include "absl/status/status.h"
 #include "core/mesher.h"
@@ -15,10 +15,14 @@ namespace wellspace::server {
 
 // What an operation works on. While it runs, the mesher is its alone; the mesh is shared, and never changed.
 struct SessionWork {
-  MemoryReservation memory;              // of `mesher`; first, so that it is given back when that is freed
-  std::unique_ptr<core::Mesher> mesher;  // null: there is none yet, or it was given up
-  uint64_t meshed_points = 0;            // how many of the session's points `mesher` has, or would have
-  std::shared_ptr<MeshSnapshot> mesh;    // the last mesh; null before the first
+  MemoryReservation memory;  // of `mesher`; first, so that it is given back when that is freed
+  // Of the session's points it has, or would have if it was not given up, those of the steps. Null: there is none yet,
+  // or it was given up.
+  std::unique_ptr<core::Mesher> mesher;
+  std::shared_ptr<MeshSnapshot> mesh;  // the last mesh; null before the first
+
+  // Leaves the mesh alone here.
+  SessionWork TakeMesher() { return {.memory = std::move(memory), .mesher = std::move(mesher), .mesh = mesh}; }
 };
 
 // How the work of an operation has ended.

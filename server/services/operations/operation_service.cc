@@ -19,7 +19,7 @@ namespace {
 absl::Status Start(const CallEnvironment& environment, const Caller& caller, const v1::StartRefinementRequest& request,
                    const IdentifiedRequest& identified, v1::StartRefinementResponse& response) {
   WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<Session> session, FindSession(environment, caller, request.name()));
-  core::MeshParameters parameters = session->parameters();
+  core::MeshParameters parameters = *session->state()->parameters;
   if (request.has_parameters()) {
     WELLSPACE_ASSIGN_OR_RETURN(parameters, ParametersForSession(request.parameters(), environment.options, *session));
   }

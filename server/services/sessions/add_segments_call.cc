@@ -6,6 +6,7 @@
 #include "server/calls/wire.h"
 #include "server/services/resource_names.h"
 #include "server/services/session_fields.h"
+#include "server/sessions/retry_with_room.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
@@ -48,7 +49,11 @@ void AddSegmentsCall::OnRequest(grpc::ByteBuffer* bytes) {
 }
 
 absl::Status AddSegmentsCall::Add(const v1::AddSegmentsRequest& request) {
-  return RunGuarded([&] { return session_->session().AddSegments(request, request.expected_revision()); });
+  const uint64_t bytes = FeatureStore::BytesOf(request.segments().ends_size() / 2, request.faces().seeds_size());
+  return RunGuarded([&] {
+    return RetryWithRoom(environment().memory, bytes,
+                         [&] { return session_->session().AddSegments(request, request.expected_revision()); });
+  });
 }
 
 void AddSegmentsCall::GoOn(absl::Status status) {
@@ -67,7 +72,12 @@ void AddSegmentsCall::OnRequestsEnd() {
     End(MakeError(v1::ERROR_REASON_EMPTY_REQUEST,
                   "the stream ended before any request; send the name of the session first", "name"));
   } else {
-    *response_ = Serialize(session_->session().CommittedSegments());
+    v1::AddSegmentsResponse response;
+    const std::shared_ptr<const SessionState> state = session_->session().state();
+    response.set_segment_count(state->record.segments());
+    response.set_seed_count(state->record.seeds());
+    response.set_revision(state->record.revision());
+    *response_ = Serialize(response);
     End(absl::OkStatus());
   }
 }

@@ -8,6 +8,7 @@
 #include "server/calls/wire.h"
 #include "server/services/resource_names.h"
 #include "server/services/session_fields.h"
+#include "server/sessions/retry_with_room.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
@@ -91,7 +92,11 @@ void SetSizesCall::OnRequestsEnd() {
     std::lock_guard lock(self->mutex_);
     if (!self->ending()) {
       if (status.ok()) {
-        *self->response_ = Serialize(self->session_->session().CommittedSizes());
+        v1::SetSizesResponse response;
+        const std::shared_ptr<const SessionState> state = self->session_->session().state();
+        response.set_size_count(state->record.size_count());
+        response.set_revision(state->record.revision());
+        *self->response_ = Serialize(response);
       }
       self->End(std::move(status));
     }
@@ -107,7 +112,9 @@ absl::Status SetSizesCall::Set(SizeStore sizes, bool of_vertices) {
     std::lock_guard lock(mutex_);
     received = std::move(memory_);
   }
-  return session_->session().SetSizes(sizes.Take(core::RunContext()), expected_revision_, &received);
+  const std::shared_ptr<const core::SizeSamples> samples = sizes.Take(core::RunContext());
+  return RetryWithRoom(environment().memory, samples == nullptr ? 0 : samples->bytes(),
+                       [&] { return session_->session().SetSizes(samples, expected_revision_, &received); });
 }
 
 absl::Status SetSizesCall::FindPoints(SizeStore& sizes) {

@@ -35,7 +35,7 @@ void UploadPointsCall::OnRequest(grpc::ByteBuffer* bytes) {
   v1::UploadPointsRequest request;
   if (absl::Status status = Parse(bytes, &request); !status.ok()) {
     End(std::move(status));
-  } else if (has_session_) {
+  } else if (upload_ != nullptr) {
     Take(request);
   } else {
     first_ = std::move(request);
@@ -54,8 +54,8 @@ absl::Status UploadPointsCall::Parse(grpc::ByteBuffer* bytes, v1::UploadPointsRe
 }
 
 void UploadPointsCall::TryToBegin() {
-  has_session_ = session_->session().BeginUpload();
-  if (has_session_) {
+  upload_ = UploadUse::Begin(session_->session_ptr());
+  if (upload_ != nullptr) {
     const v1::UploadPointsRequest first = std::exchange(first_, v1::UploadPointsRequest());
     if (absl::Status status = CheckPrefix(first); !status.ok()) {
       End(std::move(status));
@@ -144,7 +144,11 @@ void UploadPointsCall::OnCommitted(absl::Status status) {
 
 void UploadPointsCall::OnLastCommitted(absl::Status status) {
   if (status.ok()) {
-    *response_ = Serialize(session_->session().Committed());
+    v1::UploadPointsResponse response;
+    const std::shared_ptr<const SessionState> state = session_->session().state();
+    response.set_committed_points(state->record.points());
+    response.set_revision(state->record.revision());
+    *response_ = Serialize(response);
   }
   End(std::move(status));
 }
@@ -162,17 +166,14 @@ void UploadPointsCall::OnRequestsEnd() {
 }
 
 void UploadPointsCall::OnEnd() {
-  if (std::exchange(has_session_, false)) {
-    Session& session = session_->session();
-    if (session.UncommittedBytes() == 0) {
-      session.EndUpload();
-    } else {
-      // What was received is committed, and only then another upload may go on.
-      environment().blocking.Run(session.name(), [self = SharedAs<UploadPointsCall>(), &session] {
-        (void)RunGuarded([&] { return session.CommitPoints(); });
-        session.EndUpload();
-      });
-    }
+  std::shared_ptr<UploadUse> upload = std::move(upload_);
+  if (upload != nullptr && session_->session().UncommittedBytes() > 0) {
+    // What was received is committed, and only then another upload may go on.
+    environment().blocking.Run(session_->session().name(),
+                               [self = SharedAs<UploadPointsCall>(), upload = std::move(upload)]() mutable {
+                                 (void)RunGuarded([&] { return self->session_->session().CommitPoints(); });
+                                 upload = nullptr;
+                               });
   }
   first_.Clear();
   memory_.Release();

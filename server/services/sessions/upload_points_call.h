@@ -57,7 +57,7 @@ class UploadPointsCall final : public RequestStream<Call<grpc::ServerReadReactor
   grpc::ByteBuffer* const response_;  // gRPC's from Finish on
   // Guarded by mutex_.
   std::optional<SessionUse> session_;  // nothing before the first message
-  bool has_session_ = false;           // the session is this upload's
+  std::unique_ptr<UploadUse> upload_;  // null: the session is not this upload's
   int attempts_ = 0;                   // to have it
   bool is_first_ = true;               // no message has been taken
   bool is_committing_ = false;         // a commit is under way

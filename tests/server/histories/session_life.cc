@@ -285,7 +285,7 @@ std::string SessionLife::Make(Change change) {
   if (is_answered) {
     world_ = std::move(after);
     unanswered_.reset();
-    return "";
+    return disk_.is_dead() || is_planted_ ? "" : server_.CheckStates();
   }
   if (!disk_.is_dead()) {
     return "a call is not answered";
@@ -654,6 +654,9 @@ std::string SessionLife::Restart(SimulatedDisk::Loss loss, test::SplitMix64& ran
   }
   disk_.DieAt(UINT64_MAX);
   std::string problem = Find();
+  if (problem.empty() && !is_planted_) {
+    problem = server_.CheckStates();
+  }
   if (problem.empty()) {
     problem = CheckContents();
   }

@@ -60,7 +60,8 @@ class SessionLife {
   static constexpr int kSessions = 3;
 
   // REQUIRES:   `disk` is new, and outlives this.
-  SessionLife(SimulatedDisk& disk, const Plant& plant) : disk_(disk), server_(disk, plant) {}
+  SessionLife(SimulatedDisk& disk, const Plant& plant)
+      : disk_(disk), server_(disk, plant), is_planted_(plant.during != Step::kLook) {}
 
   // Starts the server. What is wrong; nothing: all is as it should be, or the disk has died.
   std::string Start();
@@ -124,6 +125,7 @@ class SessionLife {
 
   SimulatedDisk& disk_;
   SimulatedServer server_;
+  const bool is_planted_;             // then clients have to find what is wrong
   World world_;                       // after the last change that was answered
   std::vector<World> candidates_;     // besides, those that may be there after a crash
   std::optional<Change> unanswered_;  // that is made again after a crash

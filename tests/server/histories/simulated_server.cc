@@ -242,6 +242,30 @@ void SimulatedServer::Pass(absl::Duration time) {
   backend_->background().Pass(time);
 }
 
+std::string SimulatedServer::CheckStates() {
+  const absl::StatusOr<StoredSessions> stored = process_->session_log->Load();
+  if (!stored.ok()) {
+    return stored.status().ToString();
+  }
+  for (const std::shared_ptr<Session>& session : backend_->environment().sessions.All()) {
+    const auto written = std::ranges::find_if(
+        stored->sessions, [&](const StoredSession& one) { return one.state.name() == session->name(); });
+    if (written == stored->sessions.end()) {
+      return absl::StrCat(session->name(), " is not in the log");
+    }
+    absl::StatusOr<SessionState> again = StateOf(*written);
+    if (!again.ok()) {
+      return again.status().ToString();
+    }
+    SessionState shown = *session->state();
+    shown.sizes_revision = again->sizes_revision;  // that of sizes that went is not in the log
+    if (TextOf(shown) != TextOf(*again)) {
+      return absl::StrCat("shown is\n", TextOf(shown), "and a restart would make\n", TextOf(*again));
+    }
+  }
+  return "";
+}
+
 void SimulatedServer::Sweep() { backend_->background().Pass(absl::Hours(1)); }
 
 }  // namespace wellspace::server

@@ -108,6 +108,9 @@ class SimulatedServer {
   // The hourly removal of files that are garbage.
   void Sweep();
 
+  // What is wrong with the states that sessions show: each is to be what a restart would make of the log.
+  std::string CheckStates();
+
  private:
   std::function<bool()> IsAlive() {
     return [this] { return !disk_.is_dead(); };

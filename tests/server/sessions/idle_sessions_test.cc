@@ -123,7 +123,7 @@ class IdleSessionsTest : public ::testing::Test {
     ASSERT_TRUE(work.has_value());
     work->mesher = script_(operation.parameters(), {}, context).value();
     work->memory = memory_.Reserve(kStructure, "a structure").value();
-    work->memory.MakeLasting(session.MesherLasts());
+    work->memory.MakeLasting(session.inputs().lasts);
     WorkResult result{.status = absl::OkStatus(),
                       .work = *std::move(work),
                       .mesh = session.KeepMesh(MakeMesh({.dimension = 2}), context).value()};
@@ -138,7 +138,7 @@ class IdleSessionsTest : public ::testing::Test {
     return session;
   }
 
-  static bool HasStructure(const Session& session) {
+  static bool HasStructure(Session& session) {
     uint64_t version = 0;
     return session.Query(&version, [](const core::Mesher&) { return absl::OkStatus(); }).ok();
   }
@@ -182,7 +182,7 @@ TEST_F(IdleSessionsTest, WhoStartsAnOperationSeesWhatIsReplayedFirst) {
     replayed_steps = session->GetSize(0).replayed_steps;
     return absl::OkStatus();
   };
-  ASSERT_TRUE(session->StartOperation(session->parameters(), /*restart=*/false, 0, submit).ok());
+  ASSERT_TRUE(session->StartOperation(*session->state()->parameters, /*restart=*/false, 0, submit).ok());
   EXPECT_EQ(replayed_steps, 1u) << "else a long replay would be taken for small work";
   EXPECT_EQ(session->GetSize(0).replayed_steps, 1u) << "one that an earlier process left is submitted while it waits";
 }

@@ -239,7 +239,7 @@ class Living {
   }
 
   void Upload(const std::vector<double>& points) {
-    const uint64_t first = session_->Committed().committed_points();
+    const uint64_t first = session_->state()->record.points();
     const uint64_t count = points.size() / life_.dimension;
     for (uint64_t done = 0; done < count;) {
       const uint64_t again = random_ == nullptr ? 0 : random_->Below(done + 1);  // of those that it has
@@ -269,7 +269,7 @@ class Living {
   // All points at once, or the last of them first.
   void Remove(uint64_t one_of) {
     std::vector<uint64_t> numbers;
-    for (uint64_t i = 0; i < session_->Committed().committed_points(); i += one_of) {
+    for (uint64_t i = 0; i < session_->state()->record.points(); i += one_of) {
       numbers.push_back(i);
     }
     const uint64_t first = random_ == nullptr ? 0 : random_->Below(numbers.size() + 1);

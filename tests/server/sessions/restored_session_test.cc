@@ -151,7 +151,7 @@ TEST_F(RestoredSessionTest, PointsThatWereNotCommittedAreGone) {
   ASSERT_TRUE(session_->CommitPoints().ok());
   StartProcess();
   EXPECT_EQ(session_->Describe().committed_points(), 3u);
-  EXPECT_EQ(session_->points().Copy(4, 6, core::RunContext()).value(), std::vector<double>({7, 7}));
+  EXPECT_EQ(session_->inputs().points->Copy(4, 6, core::RunContext()).value(), std::vector<double>({7, 7}));
 }
 
 TEST_F(RestoredSessionTest, PointsAreCommittedWhileVerticesAreAdded) {
@@ -188,7 +188,7 @@ TEST_F(RestoredSessionTest, PointsAreCommittedWhileVerticesAreAdded) {
   StartProcess();
   EXPECT_EQ(session_->Describe().committed_points(), 4u);
   EXPECT_EQ(session_->Describe().revision(), revision);
-  EXPECT_EQ(session_->steps().points(), 4u);
+  EXPECT_EQ(session_->state()->steps.points(), 4u);
 }
 
 TEST_F(RestoredSessionTest, ASessionWhoseExpiryWasNotWrittenDownIsWhole) {
@@ -255,7 +255,7 @@ TEST_F(RestoredSessionTest, WhatComesBesideADeletionFindsNoDamage) {
     EXPECT_TRUE(session->Append(2, std::vector<double>{0.5, 1}, 0).ok()) << "an upload that goes on";
     EXPECT_TRUE(session->Append(0, points, 0).ok()) << "one that begins again";
     EXPECT_TRUE(session->CheckPrefix({.first = 0, .end = 2, .crc32c = Crc32c(points.data(), 32)}).ok());
-    EXPECT_EQ(session->points().Copy(0, 4, core::RunContext()).value(), points) << "a refinement";
+    EXPECT_EQ(session->inputs().points->Copy(0, 4, core::RunContext()).value(), points) << "a refinement";
   };
   ASSERT_TRUE(session->Close(0).ok());
   EXPECT_EQ(DetailsOf(session->Append(3, points, 0)).reason, "SESSION_NOT_FOUND");

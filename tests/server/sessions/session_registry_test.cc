@@ -181,7 +181,7 @@ TEST_F(SessionRegistryTest, PointsAreLimitedBySessionAndByTenant) {
   const absl::Status too_many = first->Append(10, std::vector<double>(2, 0.5), 0);
   EXPECT_EQ(DetailsOf(too_many).reason, "TOO_MANY_POINTS");
   EXPECT_EQ(DetailsOf(second->Append(0, std::vector<double>(12, 0.5), 0)).reason, "QUOTA_EXCEEDED");
-  EXPECT_EQ(second->Committed().committed_points(), 0u);
+  EXPECT_EQ(second->state()->record.points(), 0u);
   EXPECT_TRUE(second->Append(0, std::vector<double>(10, 0.5), 0).ok());
   EXPECT_TRUE(Create("b")->Append(0, std::vector<double>(20, 0.5), 0).ok());
   const absl::StatusOr<std::shared_ptr<Operation>> under_way = first->Close(0);

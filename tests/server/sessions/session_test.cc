@@ -3,8 +3,11 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
+#include <optional>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -105,6 +108,48 @@ TEST_F(SessionTest, WhileItsWorkIsSubmittedTheSessionIsBusyAndDoesNotShowTheOper
                   .ok());
 }
 
+TEST_F(SessionTest, ChangesThatNeedNoIdleSessionAreMadeWhileWorkIsSubmitted) {
+  const auto submit = [&](const std::shared_ptr<Operation>& /*operation*/) {
+    return session_->Update(std::map<std::string, std::string>{{"key", "value"}}, std::nullopt, 0);
+  };
+  const auto operation = session_->StartOperation({.dimension = 2}, /*restart=*/false, 0, submit);
+  ASSERT_TRUE(operation.ok()) << operation.status();
+  EXPECT_EQ(session_->Describe().labels().at("key"), "value");
+  EXPECT_EQ(session_->Describe().state(), v1::Session::STATE_REFINING);
+}
+
+TEST_F(SessionTest, ASessionThatIsDeletedWhileWorkIsSubmittedRefusesTheStart) {
+  std::shared_ptr<Operation> submitted;
+  const auto submit = [&](const std::shared_ptr<Operation>& operation) {
+    submitted = operation;
+    const auto under_way = session_->Close(0);
+    EXPECT_TRUE(under_way.ok()) << under_way.status();
+    EXPECT_EQ(under_way.value(), nullptr) << "nothing is under way yet";
+    return absl::OkStatus();
+  };
+  const auto operation = session_->StartOperation({.dimension = 2}, /*restart=*/false, 0, submit);
+  EXPECT_EQ(DetailsOf(operation.status()).reason, "SESSION_NOT_FOUND");
+  EXPECT_FALSE(session_->BeginWork(*submitted).has_value());
+}
+
+TEST_F(SessionTest, AWorkerThatIsFasterWaitsForTheStart) {
+  std::thread worker;
+  std::optional<SessionWork> work;
+  v1::Session::State seen = v1::Session::STATE_UNSPECIFIED;
+  const auto submit = [&](const std::shared_ptr<Operation>& operation) {
+    worker = std::thread([&, operation] {
+      work = session_->BeginWork(*operation);
+      seen = session_->Describe().state();
+    });
+    return absl::OkStatus();
+  };
+  const auto operation = session_->StartOperation({.dimension = 2}, /*restart=*/false, 0, submit);
+  worker.join();
+  EXPECT_TRUE(work.has_value());
+  EXPECT_EQ(seen, v1::Session::STATE_REFINING);
+  EXPECT_FALSE((*operation)->IsQueued());
+}
+
 TEST_F(SessionTest, AnOperationThatHasEndedTakesNoJob) {
   MemoryBudget memory(0);
   JobPool pool({.workers = 1, .max_queued = 1, .max_per_tenant = 2}, memory);
@@ -129,6 +174,28 @@ class LogOnAFullDisk final : public EphemeralLog {
 
   bool is_full = false;
 };
+
+TEST(SessionOnAFullDisk, AWorkerThatIsFasterThanARefusedStartDoesNotBegin) {
+  const ServiceOptions options;
+  MemoryBudget memory(uint64_t{1} << 30);
+  LogOnAFullDisk log;
+  SessionRegistry registry(options, memory, {}, log);
+  const std::shared_ptr<Session> session =
+      registry.Create({.tenant = "a", .parameters = {.dimension = 2}, .labels = {}, .ttl = {}}).value();
+  log.is_full = true;
+  std::thread worker;
+  bool has_begun = true;
+  const auto submit = [&](const std::shared_ptr<Operation>& operation) {
+    worker = std::thread([&, operation] { has_begun = session->BeginWork(*operation).has_value(); });
+    return absl::OkStatus();
+  };
+  const auto operation = session->StartOperation({.dimension = 2}, /*restart=*/false, 0, submit);
+  worker.join();
+  EXPECT_EQ(DetailsOf(operation.status()).reason, "DISK_FULL");
+  EXPECT_FALSE(has_begun);
+  log.is_full = false;
+  EXPECT_TRUE(session->StartOperation({.dimension = 2}, false, 0, [](const auto&) { return absl::OkStatus(); }).ok());
+}
 
 TEST(SessionOnAFullDisk, ChangesAreRefusedAndNoneIsMade) {
   const ServiceOptions options;
@@ -189,7 +256,7 @@ TEST(SessionRemoval, WhatIsAppendedIsCommittedWithTheRemoval) {
   log.on_removal = [&] {
     is_told = true;
     EXPECT_TRUE(session->CommitPoints().ok()) << "an upload that ends now";
-    EXPECT_EQ(session->Committed().committed_points(), 3u) << "points that are being copied stay what they are";
+    EXPECT_EQ(session->state()->record.points(), 3u) << "points that are being copied stay what they are";
     EXPECT_EQ(DetailsOf(session->Append(4, std::vector<double>{2, 2}, 0)).reason, "SESSION_BUSY");
   };
   const absl::StatusOr<PointsLeft> left = session->RemovePoints(std::vector<uint64_t>{1}, 0);
@@ -197,8 +264,8 @@ TEST(SessionRemoval, WhatIsAppendedIsCommittedWithTheRemoval) {
   EXPECT_TRUE(is_told);
   EXPECT_EQ(left->points, 3u);
   EXPECT_EQ(left->revision, revision + 1);
-  EXPECT_EQ(session->Committed().committed_points(), 3u);
-  EXPECT_EQ(session->Committed().revision(), left->revision);
+  EXPECT_EQ(session->state()->record.points(), 3u);
+  EXPECT_EQ(session->state()->record.revision(), left->revision);
 }
 
 TEST(SessionOnAFullDisk, OperationsOfAnEarlierProcessAreTakenUp) {

@@ -322,6 +322,11 @@ absl::Status StoreLife::Commit(SessionChange change, LifeState next, SessionLog:
   for (const auto& answer : forgotten_) {
     next.answers.erase(answer);
   }
+  for (auto& [number, session] : next.sessions) {
+    if (SessionName(number) == change.session) {
+      WELLSPACE_ASSIGN_OR_RETURN(session.applied, Apply(session.applied, change));
+    }
+  }
   states_.push_back(std::move(next));
   const absl::Status status = CommitToLog(std::move(change), survives);
   if (status.ok()) {
@@ -447,6 +452,10 @@ std::string StoreLife::CheckFiles(const LifeState& expected, const StoredSession
   for (const StoredSession& found : stored.sessions) {
     const auto& [number, session] = *std::ranges::find_if(
         expected.sessions, [&](const auto& entry) { return SessionName(entry.first) == found.state.name(); });
+    const absl::StatusOr<SessionState> again = StateOf(found);
+    if (!again.ok() || TextOf(*again) != TextOf(session.applied)) {
+      return absl::StrCat("the state of ", found.state.name(), ": ", again.status().ToString());
+    }
     const auto features = log_->ReadFeatures(found.state.name());
     if (!features.ok() || TextOfFeatures(*features) != TextOfFeatures(FeaturesOf(session))) {
       return absl::StrCat("features of ", found.state.name(), ": ", features.status().ToString());

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/sessions/session_state.h"
 #include "server/store/durable_log.h"
 #include "tests/server/store/simulated_disk.h"
 #include "tests/server/store/store_support.h"
@@ -27,6 +28,7 @@ struct LifeState {
     std::map<uint64_t, store::v1::OperationRecord> operations;
     std::vector<double> points;
     std::optional<MeshShape> mesh;
+    SessionState applied;  // what Apply has made of its changes
   };
 
   std::map<uint64_t, Session> sessions;                                            // by number

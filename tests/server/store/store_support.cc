@@ -11,6 +11,7 @@
 #include "google/rpc/error_details.pb.h"
 #include "grpcpp/support/slice.h"
 #include "proto/checksum.h"
+#include "server/wire/convert.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
@@ -144,6 +145,20 @@ std::string TextOf(const StoredSessions& stored) {
   std::ranges::sort(answers);
   for (const std::string& answer : answers) {
     text += answer;
+  }
+  return text;
+}
+
+std::string TextOf(const SessionState& state) {
+  std::string text = absl::StrCat(state.record.DebugString(), "sizes at ", state.sizes_revision, " structure ",
+                                  state.structure_version, "\n", state.is_deleted ? "deleted\n" : "");
+  for (const SessionStep& step : state.steps.all()) {
+    absl::StrAppend(&text, "step ", step.uploads_end, " ", step.end, " sizes ", step.sizes.number, " ",
+                    step.sizes.count, " ",
+                    step.refined_with == nullptr ? "" : ParametersToProto(*step.refined_with).DebugString(), "\n");
+  }
+  for (const std::shared_ptr<const store::v1::OperationRecord>& operation : state.operations) {
+    absl::StrAppend(&text, operation->DebugString());
   }
   return text;
 }

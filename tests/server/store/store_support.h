@@ -9,6 +9,7 @@
 
 #include "core/mesh.h"
 #include "grpcpp/support/byte_buffer.h"
+#include "server/sessions/session_state.h"
 #include "server/store/file_system.h"
 #include "server/store/session_log.h"
 
@@ -54,6 +55,7 @@ store::v1::AnswerRecord MakeAnswer(const std::string& tenant, const std::string&
 
 // All of it, so that two are the same if and only if their texts are.
 std::string TextOf(const StoredSessions& stored);
+std::string TextOf(const SessionState& state);
 
 // Whatever of the file is there.
 std::string BytesOfFile(const std::string& path);
