@@ -109,10 +109,14 @@ RawConnection::RawConnection(const std::string& address) : socket_(socket(AF_INE
   server.sin_family = AF_INET;
   server.sin_port = htons(static_cast<uint16_t>(port));
   EXPECT_EQ(inet_pton(AF_INET, address.substr(0, colon).c_str(), &server.sin_addr), 1) << address;
-  const timeval patience = {.tv_sec = kPatienceSeconds, .tv_usec = 0};
+  SetPatience(kPatienceSeconds);
+  EXPECT_EQ(connect(socket_, reinterpret_cast<const sockaddr*>(&server), sizeof(server)), 0) << address;
+}
+
+void RawConnection::SetPatience(int seconds) {
+  const timeval patience = {.tv_sec = seconds, .tv_usec = 0};
   setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
   setsockopt(socket_, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof(patience));
-  EXPECT_EQ(connect(socket_, reinterpret_cast<const sockaddr*>(&server), sizeof(server)), 0) << address;
 }
 
 RawConnection::~RawConnection() {
@@ -127,6 +131,7 @@ bool RawConnection::Send(std::string_view bytes) {
   while (!bytes.empty()) {
     const ssize_t sent = send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
     if (sent <= 0) {
+      is_stuck_ = sent < 0 && errno == EAGAIN;
       return false;
     }
     bytes.remove_prefix(sent);

@@ -66,13 +66,18 @@ class RawConnection {
   RawConnection(RawConnection&& other) noexcept;
   RawConnection& operator=(RawConnection&&) = delete;
 
-  // False when the server has closed the connection.
+  // False when the server has closed the connection, or is stuck.
   bool Send(std::string_view bytes);
   bool Send(const Frame& frame) { return Send(frame.Serialize()); }
 
   // Begins as HTTP/2 has it: preface, settings, and the server's settings acknowledged, without which gRPC takes none
   // of its limits for agreed upon. False when the server has closed the connection.
   bool Begin();
+
+  // Whether the server took nothing of what was last sent for as long as the peer has patience.
+  bool is_stuck() const { return is_stuck_; }
+  // A minute at first.
+  void SetPatience(int seconds);
 
   // Throws away what has come.
   void Discard();
@@ -103,6 +108,7 @@ class RawConnection {
   std::string ReadBytes(size_t size);
 
   int socket_;
+  bool is_stuck_ = false;
 };
 
 }  // namespace wellspace::server

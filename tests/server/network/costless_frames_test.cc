@@ -29,6 +29,10 @@ namespace {
 
 const absl::Duration kFlood = absl::Seconds(test::Amount("WELLSPACE_FLOOD_SECONDS", 0));
 [[maybe_unused]] constexpr uint64_t kMostMemory = uint64_t{200} << 20;
+// gRPC 1.51 makes 70 bytes of each byte that names a header, of which a connection may send 4.5 MiB before it is shut:
+// 320 MB on a quiet machine, and more where it is looked at late.
+[[maybe_unused]] constexpr uint64_t kMostMemoryOfNamedHeaders = uint64_t{1} << 30;
+constexpr int kPatienceSeconds = 5;
 [[maybe_unused]] constexpr absl::Duration kServedWithin = absl::Seconds(1);
 // Of one connection, with what waits in the buffers of the system. Far more, and it is not shut.
 constexpr uint64_t kMostSent = uint64_t{512} << 20;
@@ -39,6 +43,7 @@ struct Kind {
   const char* name;
   std::string start;  // behind the start of the connection
   Frame frame;        // again and again
+  uint64_t most_memory = kMostMemory;
 };
 
 // Headers of a call whose end does not come.
@@ -69,7 +74,8 @@ const std::vector<Kind>& Kinds() {
       // Each byte names a header of the table, and becomes 70 bytes of memory.
       {"IndexedContinuation",
        UnfinishedHeaders(std::string("\x40\1a\1a", 5)),
-       {.type = Frame::kContinuation, .stream = 1, .payload = std::string(200, '\xbe')}},
+       {.type = Frame::kContinuation, .stream = 1, .payload = std::string(200, '\xbe')},
+       kMostMemoryOfNamedHeaders},
       {"EmptyContinuation", UnfinishedHeaders(), {.type = Frame::kContinuation, .stream = 1}},
       {"Unknown", "", {.type = 99}},
       {"LargeUnknown", "", {.type = 99, .payload = std::string(16384, 'x')}},
@@ -77,11 +83,17 @@ const std::vector<Kind>& Kinds() {
   return kinds;
 }
 
-// Sends the frames of `kind` as fast as they are taken until the server closes the connection, or `end` has come; what
-// comes back is read, or not. Returns how many bytes were sent.
-uint64_t Flood(const std::string& address, const Kind& kind, bool reads, absl::Time end) {
+struct Flooded {
+  uint64_t bytes = 0;     // that were sent
+  bool is_stuck = false;  // the server took no more, and had not closed the connection
+};
+
+// Sends the frames of `kind` as fast as they are taken. It stops when the server closes the connection or takes no more,
+// or `end` has come. What comes back is read, or not.
+Flooded Flood(const std::string& address, const Kind& kind, bool reads, absl::Time end) {
   constexpr size_t kPiece = size_t{256} << 10;
   RawConnection connection(address);
+  connection.SetPatience(kPatienceSeconds);
   std::string piece;
   while (piece.size() < kPiece) {
     piece += kind.frame.Serialize();
@@ -96,7 +108,7 @@ uint64_t Flood(const std::string& address, const Kind& kind, bool reads, absl::T
       connection.Discard();
     }
   }
-  return sent;
+  return {sent, connection.is_stuck()};
 }
 
 class CostlessFrames : public ::testing::TestWithParam<std::tuple<size_t, const char*, bool>> {};
@@ -116,17 +128,21 @@ TEST_P(CostlessFrames, AreCutOff) {
   ASSERT_TRUE(client.GetServerInfo().ok());
   Observer observer(client);
   const absl::Time end = kFlood > absl::ZeroDuration() ? absl::Now() + kFlood : absl::InfiniteFuture();
+  bool is_stuck = false;
   do {
-    EXPECT_LT(Flood(daemon.address(), kind, reads, end), kMostSent);
+    const Flooded flooded = Flood(daemon.address(), kind, reads, end);
+    EXPECT_LT(flooded.bytes, kMostSent);
+    is_stuck = is_stuck || flooded.is_stuck;
   } while (absl::Now() < end && kFlood > absl::ZeroDuration() && !HasFailure());
   [[maybe_unused]] const absl::Duration longest = observer.Stop();
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
   EXPECT_LT(longest, kServedWithin);
-  EXPECT_LT(daemon.process().PeakMemory(), kMostMemory);
+  EXPECT_LT(daemon.process().PeakMemory(), kind.most_memory);
 #endif
   EXPECT_EQ(MeshTriangle(daemon.Client()), absl::OkStatus());
-  // gRPC itself sends away who pings.
-  EXPECT_TRUE(MetricAt(metrics, "wellspace_connections_shut_total") > 0 || std::string(kind.name) == "Ping");
+  // gRPC itself sends away who pings, and reads no more of a peer who does not read its answers.
+  EXPECT_TRUE(MetricAt(metrics, "wellspace_connections_shut_total") > 0 || is_stuck ||
+              std::string(kind.name) == "Ping");
   daemon.Stop();
 }
 

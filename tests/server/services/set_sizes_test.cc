@@ -245,16 +245,17 @@ TEST_F(SetSizesTest, SizesOfEveryExponentEnd) {
 }
 
 // Where the box is that of the points, only the refinement knows it.
-TEST_F(SetSizesTest, OutsideTheBoxOfThePointsFailTheRefinement) {
+TEST_F(SetSizesTest, OutsideTheBoxOfThePointsAreUsed) {
   v1::CreateSessionRequest create;
   create.mutable_parameters()->set_dimension(2);
   const std::string name = calls_.Create(create).name();
   calls_.Upload(name, 0, UniformPoints(50, 2, 3));
-  calls_.SetSizes({SizesRequest(name, {0.5, 0.5, 7, 0.5}, {1, 1})});
-  const v1::Operation operation = calls_.Refine(name);
-  EXPECT_EQ(operation.state(), v1::Operation::STATE_FAILED);
-  EXPECT_THAT(operation.error().message(), HasSubstr("size_samples.points[1]"));
+  calls_.Refine(name);
+  const Mesh coarse = MeshOf(name);
+  calls_.SetSizes({SizesRequest(name, {0.5, 0.5, 1.01, 0.5}, {1, 0.001})});
+  EXPECT_EQ(calls_.Refine(name).state(), v1::Operation::STATE_SUCCEEDED);
   EXPECT_EQ(calls_.Get(name).size_count(), 2u);
+  EXPECT_GT(MeshOf(name).points.size(), 2 * coarse.points.size()) << "a size beside the box counts within";
 }
 
 TEST_F(SetSizesTest, RestartMakesTheMeshOfItsPointsAlone) {
