@@ -175,6 +175,31 @@ std::optional<Sign> GlanceOrientation(const Simplex<2>& simplex) {
   return determinant > 0 ? Sign::kPositive : Sign::kNegative;
 }
 
+// The same in space.
+std::optional<Sign> GlanceOrientation(const Simplex<3>& simplex) {
+  const Point<3> a = Difference<3>(simplex[1], simplex[0]);
+  const Point<3> b = Difference<3>(simplex[2], simplex[0]);
+  const Point<3> c = Difference<3>(simplex[3], simplex[0]);
+  double determinant = 0;
+  double permanent = 0;
+  double size = 0;
+  for (size_t i = 0; i < 3; ++i) {
+    const double left = a[(i + 1) % 3] * b[(i + 2) % 3];
+    const double right = a[(i + 2) % 3] * b[(i + 1) % 3];
+    determinant += (left - right) * c[i];
+    permanent += (std::abs(left) + std::abs(right)) * std::abs(c[i]);
+    size += std::abs(c[i]);
+  }
+  // Three roundings of differences, two of products, one of a difference and two of sums: half of this.
+  constexpr double kRoundings = 0x1p-49;
+  constexpr double kLeast = 0x1p-800;  // beside it, and beside so much of a factor, what underflows is nothing
+  if (!(std::abs(determinant) > kRoundings * permanent && permanent > kLeast && permanent > kLeast * size &&
+        permanent < std::numeric_limits<double>::infinity())) {
+    return std::nullopt;
+  }
+  return determinant > 0 ? Sign::kPositive : Sign::kNegative;
+}
+
 template <int D>
 std::optional<Sign> FilterInSphere(const Simplex<D>& simplex, const Point<D>& q) {
   const std::array<Point<D>, D + 1> differences = ScaledDifferences<D, D + 1>(simplex, q).points;
@@ -310,7 +335,7 @@ BigInteger NormSq(const std::array<BigInteger, N>& row) {
 
 template <int D>
 MeasuredSign Orientation(const Simplex<D>& simplex) {
-  if constexpr (D == 2) {
+  if constexpr (D == 2 || D == 3) {
     if (const std::optional<Sign> sign = GlanceOrientation(simplex)) {
       return {*sign, Stage::kFilter};
     }

@@ -310,5 +310,17 @@ TYPED_TEST(ExactMeasureTest, CircumcentreOffsets) {
   EXPECT_EQ(ExactCircumcentreOffset<D>(flat)[0], std::numeric_limits<double>::infinity());
 }
 
+TEST(ExactMeasure, ProductsThatUnderflowDoNotDecideInSpace) {
+  // The last edge is so long that what underflows in the product of the others counts more than what does not.
+  const double tiny = 0x1p-540;
+  for (const double tilt : {-0x1p-700, 0.0, 0x1p-700}) {
+    const Simplex<3> simplex = {Point<3>{0, 0, 0}, Point<3>{tiny, 0, tilt}, Point<3>{0, tiny, 1},
+                                Point<3>{1, 0, 0x1p1000}};
+    // tiny^2 2^1000 - tiny tilt, of which the first is the larger by far.
+    EXPECT_EQ(Orientation<3>(simplex).sign, Sign::kPositive) << tilt;
+    EXPECT_EQ(Orientation<3>({simplex[0], simplex[2], simplex[1], simplex[3]}).sign, Sign::kNegative) << tilt;
+  }
+}
+
 }  // namespace
 }  // namespace wellspace::core
