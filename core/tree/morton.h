@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
@@ -58,6 +59,14 @@ class MortonGrid {
   int levels() const { return levels_; }
   const Point<D>& root_low() const { return root_low_; }
   double root_side() const { return std::ldexp(quantum(), levels_); }
+  // Of the nodes of a tree, by level.
+  std::vector<double> Sides() const {
+    std::vector<double> sides;
+    for (int level = 0; level <= levels_; ++level) {
+      sides.push_back(std::ldexp(root_side(), -level));
+    }
+    return sides;
+  }
 
   // The cube of the grid that holds `p`, a point of the box.
   GridPoint<D> CubeOf(const Point<D>& p) const {
