@@ -110,6 +110,8 @@ class SurfaceIndex {
 
   uint32_t node_count() const { return static_cast<uint32_t>(nodes_.size()); }
   uint64_t entry_count() const { return listed_.size(); }
+  // 0 of the root; a node's cube is half as long as that of the level before.
+  int level(IndexNode node) const { return node == 0 ? 0 : parents_[(node - 1) / 8].level + 1; }
   bool IsLeaf(IndexNode node) const { return nodes_[node].count != kInner; }
   // Child i of a node that is no leaf: bit k of i says high along axis k, as in the vertices' tree.
   IndexNode Child(IndexNode node, uint32_t i) const { return nodes_[node].first + i; }
