@@ -12,8 +12,8 @@
 #include "core/base/cancellable_sort.h"
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
-#include "core/features/box_misses.h"
 #include "core/geometry/box.h"
+#include "core/geometry/triangle.h"
 #include "core/geometry/vector_product.h"
 
 namespace wellspace::core {
@@ -21,6 +21,8 @@ namespace {
 
 constexpr size_t kComparedTogether = 12;
 constexpr int kDepthOfParts = 6;
+// What is rounded of coordinates, and much more; a share of them.
+constexpr double kRoom = 0x1p-45;
 constexpr int kMostDepth = 400;
 // Pairs of a part, after which it is given up.
 constexpr size_t kMostOfPart = size_t{1} << 10;
@@ -339,7 +341,7 @@ class PairFinder {
         while (complex_.triangles[t][k] != corner) {
           ++k;
         }
-        return SideMisses(At(t, (k + 1) % 3), At(t, (k + 2) % 3), wide);
+        return SurelyMisses(At(t, (k + 1) % 3), At(t, (k + 2) % 3), wide);
       });
       if (is_alone) {
         return true;
@@ -357,11 +359,11 @@ class PairFinder {
     return box;
   }
   double RoomAt(const Box<3>& box, int axis) const {
-    return least_ + kBoxRoom * (std::abs(box.low[axis]) + std::abs(box.high[axis]));
+    return least_ + kRoom * (std::abs(box.low[axis]) + std::abs(box.high[axis]));
   }
 
   bool Misses(uint32_t triangle, const Box<3>& box) const {
-    return TriangleMisses({At(triangle, 0), At(triangle, 1), At(triangle, 2)}, box);
+    return SurelyMissesByPlanes({At(triangle, 0), At(triangle, 1), At(triangle, 2)}, box);
   }
 
   // Cuts a group into two that together hold all that it can have; false where no cut is good.
@@ -548,7 +550,7 @@ class PairFinder {
       }
       const uint32_t t = group.triangles[i];
       const auto [low, high] = ReachAlong(t, plane.normal);
-      const double room = least_ + kBoxRoom * (size + std::abs(low) + std::abs(high));
+      const double room = least_ + kRoom * (size + std::abs(low) + std::abs(high));
       if (low <= plane.offset + room) {
         halves[0].triangles.push_back(t);
       }

@@ -79,6 +79,23 @@ inline std::array<Point<3>, 3> AcrossAxes(const Point<3>& edge) {
   return {Point<3>{0, -edge[2], edge[1]}, Point<3>{edge[2], 0, -edge[0]}, Point<3>{-edge[1], edge[0], 0}};
 }
 
+// Whether the closed triangle surely has no point in the closed box, as far as its own plane and the planes along its
+// sides and across it tell: four axes of thirteen. False where rounding leaves a doubt, also of needles, whose planes
+// are turned by what is rounded: each axis is taken as it is, and all corners are looked at.
+inline bool SurelyMissesByPlanes(const Triangle& triangle, const Box<3>& box) {
+  const SeenFromBox<3> seen(triangle, box);
+  const Point<3> normal = Cross(Difference<3>(triangle[1], triangle[0]), Difference<3>(triangle[2], triangle[0]));
+  if (seen.IsPartedBy(normal)) {
+    return true;
+  }
+  for (size_t k = 0; k < 3; ++k) {
+    if (seen.IsPartedBy(Cross(Difference<3>(triangle[(k + 1) % 3], triangle[k]), normal))) {
+      return true;
+    }
+  }
+  return false;
+}
+
 // Whether the closed triangle surely has no point in the closed box; false where rounding leaves a doubt.
 //
 // Source:     T. Akenine-Möller, "Fast 3D triangle-box overlap testing", 2001: thirteen axes.

@@ -61,6 +61,34 @@ class TrianglePairsTest : public test::SeededTest {
   }
 };
 
+TEST_F(TrianglePairsTest, NeedlesAreLostNowhere) {
+  // Each with a small triangle around a point near its end: planes of needles are turned by what is rounded.
+  for (const double width : {1e-4, 1e-8, 1e-12}) {
+    test::TestSurface surface;
+    for (int i = 0; i < 200; ++i) {
+      const Point<3> a = {random_.Unit(), random_.Unit(), random_.Unit()};
+      const Point<3> b = {random_.Unit(), random_.Unit(), random_.Unit()};
+      Point<3> c;
+      Point<3> at;
+      const double share = random_.Unit();
+      for (int axis = 0; axis < 3; ++axis) {
+        c[axis] = a[axis] + share * (b[axis] - a[axis]) + width * random_.Gauss();
+        at[axis] = a[axis] + 1e-9 * (b[axis] - a[axis]);
+      }
+      surface.AddTriangle({surface.AddPoint(a), surface.AddPoint(b), surface.AddPoint(c)});
+      const auto beside = [&] {
+        return surface.AddPoint(
+            {at[0] + 1e-9 * random_.Gauss(), at[1] + 1e-9 * random_.Gauss(), at[2] + 1e-9 * random_.Gauss()});
+      };
+      const uint32_t first = beside();
+      const uint32_t second = beside();
+      surface.AddTriangle({first, second, beside()});
+    }
+    const SurfaceComplex complex = ComplexOf(surface);
+    EXPECT_TRUE(Find(complex).pairs == AllPairs(complex, 0)) << width;
+  }
+}
+
 TEST_F(TrianglePairsTest, AreThoseOfAllPairs) {
   for (const double size : {0.01, 0.05, 0.3}) {
     const SurfaceComplex complex = ComplexOf(Random(size > 0.1 ? 60 : 400, size));

@@ -85,6 +85,26 @@ TEST_F(TriangleTest, BoxesWithAPointOfATriangleAreNotMissed) {
   }
 }
 
+TEST_F(TriangleTest, BoxesWithACornerOfANeedleAreNotMissed) {
+  // Planes of needles are turned by what is rounded.
+  for (int round = 0; round < 20000; ++round) {
+    const double width = std::pow(10.0, -3 - 12 * random_.Unit());
+    const double share = random_.Unit();
+    Triangle triangle = {RandomPoint(), RandomPoint(), {}};
+    for (int axis = 0; axis < 3; ++axis) {
+      triangle[2][axis] = triangle[0][axis] + share * (triangle[1][axis] - triangle[0][axis]) + width * random_.Unit();
+    }
+    const Point<3>& p = triangle[random_.Below(3)];
+    Box<3> box{p, p};
+    for (int axis = 0; axis < 3; ++axis) {
+      box.low[axis] -= random_.Below(2) == 0 ? 1e-3 * random_.Unit() : 0;
+      box.high[axis] += random_.Below(2) == 0 ? 1e-3 * random_.Unit() : 0;
+    }
+    EXPECT_FALSE(SurelyMisses(triangle, box));
+    EXPECT_FALSE(SurelyMissesByPlanes(triangle, box));
+  }
+}
+
 TEST_F(TriangleTest, BoxesThatAreFartherThanRoundingAreMissed) {
   for (int round = 0; round < 5000; ++round) {
     const Triangle triangle = {RandomPoint(), RandomPoint(), RandomPoint()};
