@@ -88,8 +88,8 @@ struct Flooded {
   bool is_stuck = false;  // the server took no more, and had not closed the connection
 };
 
-// Sends the frames of `kind` as fast as they are taken. It stops when the server closes the connection or takes no more,
-// or `end` has come. What comes back is read, or not.
+// Sends the frames of `kind` as fast as they are taken. Ends when the server closes the connection or takes no more, or
+// `end` has come. What comes back is read, or not.
 Flooded Flood(const std::string& address, const Kind& kind, bool reads, absl::Time end) {
   constexpr size_t kPiece = size_t{256} << 10;
   RawConnection connection(address);
