@@ -30,7 +30,7 @@ USER 7233
 VOLUME /var/lib/wellspace
 EXPOSE 7233 9464
 STOPSIGNAL SIGTERM
-# Of the tool, for the health check and `docker exec`.
+# Of the tool, for `docker exec` and the health check, which asks the health service of gRPC: it is there without --metrics-listen.
 ENV WELLSPACE_SERVER=127.0.0.1:7233
 HEALTHCHECK --interval=30s --timeout=5s --start-period=10s CMD ["wellspace", "server", "health"]
 ENTRYPOINT ["wellspaced"]

@@ -1,4 +1,4 @@
-"""The reference clouds of all benchmarks, and what meshes of them have had.
+"""The reference clouds of all benchmarks, and the figures of their meshes.
 
 Synthetic clouds come from make_clouds.py; real ones and real domains from examples/, scaled uniformly to a longest side
 of 0.8 and centred in the unit box. The domain of all of them is the unit box.

@@ -12,11 +12,11 @@ CLOUDS = ROOT / "build" / "bench" / "clouds"
 
 
 class Failed(Exception):
-    """A program could not be run, or what it made is wrong."""
+    """A program could not be run, or its result is wrong."""
 
 
 def build(target):
-    """Installs what is missing from Debian and builds `target` as Wellspace ships."""
+    """Installs missing packages of Debian and builds `target` as Wellspace ships."""
     subprocess.run([ROOT / "deploy" / "install-deps.sh", "build", "bench"], check=True)
     configure = ["cmake", "--preset", "release", "-DWELLSPACE_BENCH=ON"]
     subprocess.run(configure, cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
@@ -24,7 +24,7 @@ def build(target):
 
 
 def run(folder, program, path, *arguments):
-    """Runs bench_PROGRAM on the points in `path` and returns what it reports."""
+    """Runs bench_PROGRAM on the points in `path` and returns its report."""
     command = [str(pathlib.Path(folder) / f"bench_{program}"), str(path), *map(str, arguments)]
     try:
         result = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
@@ -37,7 +37,7 @@ def run(folder, program, path, *arguments):
 
 
 def first_line(*command):
-    """What a command says first, or an empty string."""
+    """The first line of a command's output, or an empty string."""
     try:
         return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.partition("\n")[0].strip()
     except (OSError, subprocess.CalledProcessError):
@@ -45,7 +45,7 @@ def first_line(*command):
 
 
 def machine():
-    """Where and on what something was measured."""
+    """The machine, the time and the programs of a measurement."""
     model = ""
     for line in pathlib.Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
         if line.startswith("model name"):

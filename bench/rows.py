@@ -1,4 +1,4 @@
-"""What bench/compare measures: which programs on which clouds, what is read off them, and what is aimed at."""
+"""The rows of bench/compare: programs and clouds, the values read off them, and the targets."""
 import collections
 
 import clouds
@@ -9,7 +9,7 @@ Run = collections.namedtuple("Run", "program cloud arguments")
 # A row of the table.
 #   value(ours, peers) -> float: from the reports of one repetition, ours by number of threads
 #   better: ">=" or "<=": how the value is compared with the targets
-#   targets: by number of threads; none for what is measured only to be known
+#   targets: by number of threads; none for values that are measured only to be known
 #   ours: {threads: Run}; peers: [Run]
 Row = collections.namedtuple("Row", "name what value better targets ours peers quick")
 

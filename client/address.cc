@@ -33,7 +33,7 @@ std::optional<std::string> HostBeforePort(const std::string& address) {
   return host.front() == '[' && host.back() == ']' ? host.substr(1, host.size() - 2) : host;
 }
 
-// Of a URL: what is too much in it, and what is left.
+// Of a URL: the part that is too much, and the rest.
 absl::Status UrlError(const std::string& address, size_t scheme_end) {
   const std::string scheme = address.substr(0, scheme_end + kSchemeEnd.size());
   std::string rest = address.substr(scheme.size());

@@ -1,4 +1,4 @@
-// How a call is made: what all calls of the library have in common.
+// The common options of all calls of the library.
 #ifndef WELLSPACE_CLIENT_CALL_OPTIONS_H_
 #define WELLSPACE_CLIENT_CALL_OPTIONS_H_
 
@@ -11,7 +11,7 @@
 
 namespace wellspace::client {
 
-// What every call takes besides its arguments.
+// The options of every call besides its arguments.
 struct CallOptions {
   // Of the whole call, with all its attempts. Work that the call started goes on.
   absl::Duration timeout = absl::InfiniteDuration();
@@ -20,7 +20,7 @@ struct CallOptions {
   std::stop_token stop;
 
   // Of a call that changes something: a repetition with the same id and content does nothing and returns the first
-  // answer. Empty: one is chosen, so that what the library repeats after a lost connection is done once.
+  // answer. Empty: one is chosen, so that calls repeated after a lost connection are done once.
   std::string request_id;
 
   // Of a call that changes a session: ABORTED unless the session is at this revision, of which 1 is the first.

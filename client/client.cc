@@ -66,6 +66,12 @@ absl::StatusOr<AddedSegments> Client::AddSegments(const std::string& session, co
   return connection_->AddSegments(session, features, offset, call);
 }
 
+absl::StatusOr<AddedTriangles> Client::AddTriangles(const std::string& session, const SurfaceFeatures& surface,
+                                                    const std::optional<SurfaceOffset>& offset,
+                                                    const CallOptions& call) {
+  return connection_->AddTriangles(session, surface, offset, call);
+}
+
 absl::StatusOr<SizesSet> Client::SetSizes(const std::string& session, const SizeSamples& samples,
                                           const CallOptions& call) {
   return connection_->SetSizes(session, samples, call);
@@ -130,8 +136,9 @@ absl::StatusOr<Located> Client::Locate(const std::string& session, std::span<con
 }
 
 absl::StatusOr<AddedVertices> Client::AddVertices(const std::string& session, std::span<const double> points,
-                                                  std::span<const uint32_t> near, const CallOptions& call) {
-  return connection_->AddVertices(session, points, near, call);
+                                                  std::span<const uint32_t> near, const OnAdded& on_added,
+                                                  const CallOptions& call) {
+  return connection_->AddVertices(session, points, near, on_added, call);
 }
 
 }  // namespace wellspace::client

@@ -33,15 +33,17 @@ using OnPoints = std::function<void(uint64_t points)>;
 // Takes a batch of an answer; an error ends the call with it.
 using OnDistances = std::function<absl::Status(std::span<const double>)>;
 using OnCells = std::function<absl::Status(const CellBatch&)>;
+// The vertices that the next points of an addition have become, and the revision that this has made.
+using OnAdded = std::function<void(const AddedVertices&)>;
 
-// A thin face over a Connection, which has the deadlines, repeats what a broken connection interrupted, and goes on
+// A thin face over a Connection, which has the deadlines, repeats calls after a broken connection, and goes on
 // with uploads, watches and downloads where they were.
 //
 // Callbacks may be empty; they are called by the thread that made the call, while it waits.
 //
 // Errors of all calls: the server's, unchanged; CANCELLED when `call.stop` asks for it; DEADLINE_EXCEEDED when
 // `call.timeout` has passed; UNAVAILABLE when the server cannot be reached, after patient attempts; DATA_LOSS when its
-// answer contradicts itself; those of sinks, sources and callbacks. BlamedField and ReasonOf tell more.
+// answer contradicts itself; errors of sinks, sources and callbacks. BlamedField and ReasonOf tell more.
 //
 // Thread safety: thread-safe.
 class Client {
@@ -51,7 +53,7 @@ class Client {
   // Meshes `points` (n x dimension, row-major).
   absl::StatusOr<Mesh> MeshPoints(const MeshOptions& options, std::span<const double> points,
                                   const OnProgress& on_progress = nullptr, const CallOptions& call = {});
-  // The same into a sink, for meshes that need not fit into memory.
+  // As above, into a sink, for meshes that need not fit into memory.
   absl::Status MeshPoints(const MeshOptions& options, std::span<const double> points, MeshSink& sink,
                           const OnProgress& on_progress = nullptr, const CallOptions& call = {});
 
@@ -66,7 +68,7 @@ class Client {
   // Sessions; see the proto's SessionService. `session` is a name, "sessions/{session}".
   absl::StatusOr<Session> CreateSession(const SessionOptions& options, const CallOptions& call = {});
   absl::StatusOr<Session> GetSession(const std::string& session, const CallOptions& call = {});
-  // Those that have all of `labels`, a page at a time.
+  // The sessions that have all of `labels`, a page at a time.
   absl::StatusOr<SessionPage> ListSessions(const Labels& labels = {}, const PageOptions& page = {},
                                            const CallOptions& call = {});
   absl::StatusOr<Session> UpdateSession(const std::string& session, const SessionChange& change,
@@ -74,7 +76,7 @@ class Client {
   absl::Status DeleteSession(const std::string& session, const CallOptions& call = {});
 
   // Adds the points of `source` to a session. `offset` is the number of the session's points before the first of them:
-  // what is there from it on is not sent again, so that an upload that broke off is simply repeated with the same
+  // points there from it on are not sent again, so that an upload that broke off is simply repeated with the same
   // offset. It has to be of the same source: the server compares a checksum, and FAILED_PRECONDITION (UPLOAD_MISMATCH)
   // ends the call if it is not. Absent: after the points that are there when the call begins. A session takes one
   // upload at a time: FAILED_PRECONDITION (SESSION_BUSY). `call.expected_revision` is that before the call.
@@ -82,8 +84,8 @@ class Client {
                                         std::optional<uint64_t> offset = std::nullopt,
                                         const OnPoints& on_points = nullptr, const CallOptions& call = {});
 
-  // Takes the points with these numbers out of a session. Those behind move down, and the next refinement makes the
-  // mesh anew of those that are left; see the proto. At most some 10^5 numbers, as many as one request has room for.
+  // Takes the points with these numbers out of a session. The points behind move down, and the next refinement makes
+  // the mesh anew of the points left; see the proto. At most some 10^5 numbers, as many as one request has room for.
   absl::StatusOr<PointsLeft> RemovePoints(const std::string& session, std::span<const uint64_t> points,
                                           const CallOptions& call = {});
 
@@ -96,11 +98,16 @@ class Client {
                                             const std::optional<FeatureOffset>& offset = std::nullopt,
                                             const CallOptions& call = {});
 
+  // The same of triangles and solids, for a session in 3-D.
+  absl::StatusOr<AddedTriangles> AddTriangles(const std::string& session, const SurfaceFeatures& surface,
+                                              const std::optional<SurfaceOffset>& offset = std::nullopt,
+                                              const CallOptions& call = {});
+
   // Replaces the sizes at points that the next refinements of a session keep to; without any, it has none from then on.
   // They are taken together, so that a call that broke off is simply repeated.
   absl::StatusOr<SizesSet> SetSizes(const std::string& session, const SizeSamples& samples,
                                     const CallOptions& call = {});
-  // The same with one size for each vertex of the session's mesh, in their order.
+  // As SetSizes, with one size for each vertex of the session's mesh, in their order.
   absl::StatusOr<SizesSet> SetVertexSizes(const std::string& session, const VertexSizes& sizes,
                                           const CallOptions& call = {});
 
@@ -109,8 +116,8 @@ class Client {
   absl::Status DownloadMesh(const std::string& session, MeshSink& sink, std::optional<uint64_t> revision = std::nullopt,
                             const OnChunks& on_chunks = nullptr, const CallOptions& call = {});
 
-  // Brings `mesh`, which a MeshCollector has got of the session, up to date: what has changed since `mesh.revision` is
-  // downloaded and applied, and its checksum looked at. Where the server does not know what has changed, or `mesh` is
+  // Brings `mesh`, which a MeshCollector has got of the session, up to date: the differences since `mesh.revision` are
+  // downloaded and applied, and its checksum looked at. Where the server does not have these differences, or `mesh` is
   // not what it was, all is downloaded. Then `mesh` is, to the bit, what DownloadMesh would bring. On an error it is as
   // it was, or as the session had it in between.
   absl::Status UpdateMesh(const std::string& session, Mesh& mesh, const OnChunks& on_chunks = nullptr,
@@ -140,10 +147,15 @@ class Client {
   // the same mesh. ABORTED (REVISION_MISMATCH) if it is replaced meanwhile.
   absl::StatusOr<Located> Locate(const std::string& session, std::span<const double> points,
                                  const LocateOptions& options = {}, const CallOptions& call = {});
-  // `points`: k x dimension, row-major. `near`: a vertex near each, or empty. All become vertices or none, so they have
-  // to fit into one request of 4 MiB: some 10^5 points. INVALID_ARGUMENT for more.
+  // Adds vertices at `points`, k x dimension, row-major. `near`: a vertex near each, or empty. They are sent in
+  // requests with at most 3 MiB of them, 10^5 points in 3-D: the points of each become vertices all or none, and each
+  // makes a revision, of which the last is returned. `call.expected_revision` is that before the call; a change in
+  // between is ABORTED. On an error vertices of the requests before stay: `on_added` was told of it, and the
+  // message says how many points it is. A repetition of the call is safe: each request carries a request_id, and later
+  // a point that is a vertex already is given its number.
   absl::StatusOr<AddedVertices> AddVertices(const std::string& session, std::span<const double> points,
-                                            std::span<const uint32_t> near = {}, const CallOptions& call = {});
+                                            std::span<const uint32_t> near = {}, const OnAdded& on_added = nullptr,
+                                            const CallOptions& call = {});
 
  private:
   std::shared_ptr<Connection> connection_;
@@ -151,7 +163,7 @@ class Client {
 
 // Connects to HOST:PORT. Lazy: errors of the connection show in the first call.
 //
-// Errors:     INVALID_ARGUMENT: the address; options that contradict each other; a file that has not what it should
+// Errors:     INVALID_ARGUMENT: the address; options that contradict each other; a file without the contents it should
 //             have. FAILED_PRECONDITION: the token would leave this machine in plain text. NOT_FOUND: a file cannot be
 //             read.
 absl::StatusOr<Client> Connect(const std::string& address, const ConnectOptions& options = {});

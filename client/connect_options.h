@@ -1,4 +1,4 @@
-// What a client shows a server, and what it wants to be shown.
+// The credentials that a client shows a server, and that it wants to be shown.
 #ifndef WELLSPACE_CLIENT_CONNECT_OPTIONS_H_
 #define WELLSPACE_CLIENT_CONNECT_OPTIONS_H_
 
@@ -9,7 +9,7 @@ namespace wellspace::client {
 // Paths are of PEM files, read when the connection is made.
 struct ConnectOptions {
   bool tls = false;                  // also on where one of the next three is given; otherwise plain text
-  std::string tls_ca = "";           // authorities of the server's certificate; empty: those that this machine trusts
+  std::string tls_ca = "";           // authorities of the server's certificate; empty: all that this machine trusts
   std::string tls_certificate = "";  // this client's own, then those between it and its authority
   std::string tls_key = "";          // of the certificate
 

@@ -1,4 +1,4 @@
-// What a Client talks through.
+// The way of a Client to its server.
 #ifndef WELLSPACE_CLIENT_CONNECTION_H_
 #define WELLSPACE_CLIENT_CONNECTION_H_
 
@@ -26,8 +26,8 @@ namespace wellspace::client {
 //
 //   client::Client client(std::make_shared<FakeConnection>());
 //
-// tests/client/client_test.cc does so. What a Connection returns reaches the caller of the Client as it is: a fake
-// decides about errors, events and meshes. For tests of what comes over the wire, MakeConnection takes any channel.
+// tests/client/client_test.cc does so. The results of a Connection reach the caller of the Client as it is: a fake
+// decides about errors, events and meshes. For tests of messages on the wire, MakeConnection takes any channel.
 //
 // Thread safety: implementations are thread-safe.
 class Connection {
@@ -59,6 +59,9 @@ class Connection {
   virtual absl::StatusOr<AddedSegments> AddSegments(const std::string& session, const Features& features,
                                                     const std::optional<FeatureOffset>& offset,
                                                     const CallOptions& call) = 0;
+  virtual absl::StatusOr<AddedTriangles> AddTriangles(const std::string& session, const SurfaceFeatures& surface,
+                                                      const std::optional<SurfaceOffset>& offset,
+                                                      const CallOptions& call) = 0;
   virtual absl::StatusOr<SizesSet> SetSizes(const std::string& session, const SizeSamples& samples,
                                             const CallOptions& call) = 0;
   virtual absl::StatusOr<SizesSet> SetVertexSizes(const std::string& session, const VertexSizes& sizes,
@@ -86,7 +89,8 @@ class Connection {
   virtual absl::StatusOr<Located> Locate(const std::string& session, std::span<const double> points,
                                          const LocateOptions& options, const CallOptions& call) = 0;
   virtual absl::StatusOr<AddedVertices> AddVertices(const std::string& session, std::span<const double> points,
-                                                    std::span<const uint32_t> near, const CallOptions& call) = 0;
+                                                    std::span<const uint32_t> near, const OnAdded& on_added,
+                                                    const CallOptions& call) = 0;
 };
 
 // A connection over `channel`, for example that of an embedded server.

@@ -1,4 +1,4 @@
-// What the server says of an error besides code and message.
+// The details of a server's error besides code and message.
 #ifndef WELLSPACE_CLIENT_ERROR_DETAILS_H_
 #define WELLSPACE_CLIENT_ERROR_DETAILS_H_
 
@@ -23,7 +23,7 @@ std::string BlamedField(const absl::Status& status);
 // server's.
 std::string ReasonOf(const absl::Status& status);
 
-// How long the server wants a client to wait before it tries again; absent: it does not say that this would help.
+// The time that the server wants a client to wait before it tries again; absent: it does not say that this would help.
 std::optional<absl::Duration> RetryDelayOf(const absl::Status& status);
 
 // `status` with another message, and with all that the server has said besides.

@@ -13,7 +13,7 @@
 
 namespace wellspace::client {
 
-// What values at vertices are.
+// The kind of values at vertices.
 struct VertexValues {
   size_t width = 1;                    // numbers of each vertex
   std::optional<uint64_t> revision{};  // of the mesh whose vertices they are, Mesh.revision; none: as `located`

@@ -62,4 +62,9 @@ absl::Status MeshCollector::AddFacets(std::span<const uint32_t> facets) {
   return absl::OkStatus();
 }
 
+absl::Status MeshCollector::AddRidges(std::span<const uint32_t> ridges) {
+  mesh_.ridges.insert(mesh_.ridges.end(), ridges.begin(), ridges.end());
+  return absl::OkStatus();
+}
+
 }  // namespace wellspace::client

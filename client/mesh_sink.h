@@ -1,4 +1,4 @@
-// Where a mesh goes while it arrives.
+// The sink of a mesh, into which it goes while it arrives.
 #ifndef WELLSPACE_CLIENT_MESH_SINK_H_
 #define WELLSPACE_CLIENT_MESH_SINK_H_
 
@@ -13,9 +13,9 @@ namespace wellspace::client {
 // Takes a mesh piece by piece, so that it need not fit into memory.
 //
 // Calls come in the order of the functions below, from one thread, those for the arrays as often as there are pieces of
-// them. Pieces are whole rows; those of one array follow one another, and add up to what the header says; every number
-// of a vertex is below vertex_count. Each piece comes once, however often the connection broke meanwhile. After an
-// error no further call comes, and the error is what the client's call returns.
+// them. Pieces are whole rows; pieces of one array follow one another, and add up to the counts of the header; every
+// number of a vertex is below vertex_count. Each piece comes once, however often the connection broke meanwhile. After
+// an error no further call comes, and the client's call returns the error.
 class MeshSink {
  public:
   MeshSink() = default;
@@ -42,8 +42,10 @@ class MeshSink {
   virtual absl::Status AddSimplices(std::span<const uint32_t> simplices) = 0;
   // For the next input points the vertices that they became.
   virtual absl::Status AddInputVertices(std::span<const uint32_t> vertices) = 0;
-  // Rows of `dimension` vertices: the facets of the header's first part of the boundary, then those of its second, …
+  // Rows of `dimension` vertices: the facets of the header's first part of the boundary, then of its second, …
   virtual absl::Status AddFacets(std::span<const uint32_t> /*facets*/) { return absl::OkStatus(); }
+  // Rows of 2 vertices: the edges on creases of a surface. Called only if there are any.
+  virtual absl::Status AddRidges(std::span<const uint32_t> /*ridges*/) { return absl::OkStatus(); }
   // The mesh is complete.
   virtual absl::Status Finish() = 0;
 };
@@ -51,7 +53,7 @@ class MeshSink {
 // Has `mesh` be of this header, but for the arrays.
 void SetHeader(const MeshHeader& header, Mesh& mesh);
 
-// Keeps the whole mesh in memory, which grows with what arrives, not with what was announced.
+// Keeps the whole mesh in memory, which grows with the chunks that arrive, not with the announced sizes.
 //
 // Thread safety: thread-compatible.
 class MeshCollector final : public MeshSink {
@@ -67,9 +69,10 @@ class MeshCollector final : public MeshSink {
   absl::Status AddSimplices(std::span<const uint32_t> simplices) override;
   absl::Status AddInputVertices(std::span<const uint32_t> vertices) override;
   absl::Status AddFacets(std::span<const uint32_t> facets) override;
+  absl::Status AddRidges(std::span<const uint32_t> ridges) override;
   absl::Status Finish() override { return absl::OkStatus(); }
 
-  // What has been collected; to be moved from when the mesh is complete.
+  // The mesh that has been collected; to be moved from when the mesh is complete.
   Mesh& mesh() { return mesh_; }
 
  private:

@@ -1,4 +1,4 @@
-// Where the points of an upload come from.
+// The source of the points of an upload.
 #ifndef WELLSPACE_CLIENT_POINT_SOURCE_H_
 #define WELLSPACE_CLIENT_POINT_SOURCE_H_
 
@@ -23,7 +23,7 @@ class PointSource {
   // Of the points; at least 1, always the same.
   virtual int dimension() const = 0;
 
-  // The next Read starts at point `first`, or at the end when there are not so many. Called before the first Read.
+  // The next Read starts at point `first`, or at the end when there are fewer. Called before the first Read.
   virtual absl::Status Seek(uint64_t first) = 0;
 
   // Fills `rows` from its start with the next points, and returns how many those are: 0 at the end only.

@@ -7,8 +7,8 @@
 
 namespace wellspace::client {
 
-// `text` with what a terminal may obey, or cannot show, as \xHH: control characters of ASCII and of Latin-1 (U+0080 to
-// U+009F), and bytes that are no UTF-8.
+// `text` with bytes that a terminal may obey, or cannot show, as \xHH: control characters of ASCII and of Latin-1
+// (U+0080 to U+009F), and bytes that are no UTF-8.
 //
 // Guarantees: (1) the result is UTF-8 without control characters; (2) text without any is not changed.
 // Complexity: O(bytes).

@@ -9,24 +9,24 @@
 
 namespace wellspace::client {
 
-// How patient a connection is. An attempt that brought something (a chunk, an event, committed points) is not counted:
-// those after it begin anew.
+// The patience of a connection. An attempt that brought something (a chunk, an event, committed points) is not counted:
+// later ones begin anew.
 struct RetryPolicy {
   // Attempts in a row that may fail, with a server that has answered before; at least 1.
   int max_attempts = 8;
 
-  // The same with a server that has never answered: its address may be wrong.
+  // As above, with a server that has never answered: its address may be wrong.
   int max_first_attempts = 3;
 
   // Waiting time before the second attempt; grows by `multiplier` for each further one, up to `max_backoff`. A random
-  // half of it is left out, so that clients of a server that comes back do not come all at once. What the server asks
-  // for (google.rpc.RetryInfo) is waited for in full.
+  // half of it is left out, so that clients of a server that comes back do not come all at once. A delay that it
+  // asks for (google.rpc.RetryInfo) is waited for in full.
   absl::Duration initial_backoff = absl::Milliseconds(200);
   double multiplier = 2;
   absl::Duration max_backoff = absl::Seconds(10);
 };
 
-// Whether the same call may succeed later: UNAVAILABLE, a reader that stalled, and what has a google.rpc.RetryInfo.
+// Whether the same call may succeed later: UNAVAILABLE, a reader that stalled, and errors with google.rpc.RetryInfo.
 bool IsWorthRepeating(const absl::Status& status);
 
 // An attempt at a call that has failed, and how the call stands.
@@ -46,7 +46,7 @@ struct FailedAttempt {
   absl::Duration time_left = absl::InfiniteDuration();
 };
 
-// How long to wait before the next attempt; absent: there is to be none, since it makes no sense, there were enough, or
+// The time to wait before the next attempt; absent: there is to be none, since it makes no sense, there were enough, or
 // the deadline comes before it. `jitter` is the part of the growing time that is waited for, in [0.5, 1].
 //
 // Guarantees: (1) a function of its arguments alone; (2) never less than the server asks for; (3) below time_left.

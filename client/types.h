@@ -1,4 +1,4 @@
-// What calls of the client library take and return: meshes, sessions, operations, answers of the query structure.
+// The arguments and results of the client library: meshes, sessions, operations, answers of the query structure.
 #ifndef WELLSPACE_CLIENT_TYPES_H_
 #define WELLSPACE_CLIENT_TYPES_H_
 
@@ -14,7 +14,7 @@
 
 namespace wellspace::client {
 
-// What `rho` bounds; see the proto's Criterion.
+// The quantity that `rho` bounds; see the proto's Criterion.
 enum class Criterion { kRadiusEdge, kWellSpaced };
 
 // A box in which simplices are small; see the proto's SizeBox.
@@ -24,7 +24,7 @@ struct SizeBox {
   double max_circumradius = 0;
 };
 
-// What a size says; see the proto's SizeMeasure.
+// The length that a size bounds; see the proto's SizeMeasure.
 enum class SizeMeasure { kCircumradius, kEdgeLength };
 
 // Sizes at points; see the proto's SizeSamples.
@@ -41,10 +41,10 @@ struct VertexSizes {
   std::optional<uint64_t> mesh_revision{};  // of the mesh whose vertices they are; none: the last one
 };
 
-// Which faces, into which segments cut the plane, are meshed; see the proto's FaceRule.
+// The faces, into which segments cut the plane, that are meshed; see the proto's FaceRule.
 enum class FaceRule { kBox, kHoles, kEvenOdd, kUnion };
 
-// What becomes of segments that cross, and of points too near to a segment; see the proto's CrossingRule.
+// The treatment of segments that cross, and of points too near to a segment; see the proto's CrossingRule.
 enum class CrossingRule { kRefuse, kSnap, kSplit };
 
 // See the proto's FaceSeed.
@@ -54,7 +54,7 @@ struct FaceSeed {
   bool is_hole = false;
   int32_t region = 0;
   std::optional<double> max_area{};  // none: no bound
-  // The rings of a polygon: so many segments from the first on. It stands for all faces inside of them. 0: the seed is
+  // The rings of a polygon: its segments from the first on. It stands for all faces inside of them. 0: the seed is
   // the point, as it is to a server that is too old to know of polygons.
   uint64_t first_segment = 0;
   uint64_t segment_count = 0;
@@ -69,11 +69,49 @@ struct Features {
   std::vector<FaceSeed> seeds;
   FaceRule faces = FaceRule::kBox;
   CrossingRule crossings = CrossingRule::kRefuse;
-  std::optional<double> snap_distance{};  // of kSnap and kSplit; none: what doubles cannot serve
+  std::optional<double> snap_distance{};  // of kSnap and kSplit; none: distances that doubles cannot resolve
 };
 
-// What to mesh and how. What is empty is the server's default, as the comments of the proto's MeshParameters say. A 0
-// is sent as it is, and refused where it can be no value.
+// The solids, into which triangles cut space, that are meshed; see the proto's SolidRule.
+enum class SolidRule { kEvenOdd, kHoles, kWinding };
+
+// See the proto's SolidSeed.
+struct SolidSeed {
+  double x = 0;
+  double y = 0;
+  double z = 0;
+  bool is_hole = false;
+  int32_t region = 0;
+  std::optional<double> max_volume{};  // none: no bound
+};
+
+// Triangles between points in 3-D, and the solids that they bound; see the proto's TriangleChunk and SurfaceOptions.
+struct SurfaceFeatures {
+  std::vector<uint32_t> corners;  // m x 3, row-major: indices of points
+  std::vector<int32_t> markers;   // m, or none: then all are 0
+  std::vector<SolidSeed> seeds;
+  SolidRule solids = SolidRule::kEvenOdd;
+  std::optional<double> crease_angle{};  // degrees
+  std::optional<double> weld{};
+  std::optional<double> min_patch{};
+  std::optional<double> resolution{};  // of kWinding
+};
+
+// The fidelity of a mesh to its surface; see the proto's SurfaceParameters.
+struct SurfaceParameters {
+  std::optional<double> tolerance{};
+  std::optional<double> min_facet_angle{};  // degrees; 0: off
+  std::optional<double> edge_length{};
+  std::optional<double> min_size{};
+  std::optional<double> outside_rho{};
+  std::optional<double> curvature_elements{};
+  std::optional<double> thickness_layers{};
+
+  bool operator==(const SurfaceParameters&) const = default;
+};
+
+// The parameters of a mesh. An empty field is the server's default, as the comments of the proto's MeshParameters say.
+// A 0 is sent as it is, and refused where it can be no value.
 struct MeshOptions {
   int dimension = 3;
   std::optional<double> rho;
@@ -93,6 +131,9 @@ struct MeshOptions {
   std::optional<int> threads;
   std::shared_ptr<const Features>
       features;  // of MeshPoints and EstimateMesh, in 2-D; null: none. Those of a session: AddSegments
+  std::shared_ptr<const SurfaceFeatures>
+      surface;  // the same in 3-D, of which a mesh has one of the two at most. Of a session: AddTriangles
+  SurfaceParameters surface_parameters;
   std::shared_ptr<const SizeSamples>
       size_samples;  // of MeshPoints and EstimateMesh; null: none. Those of a session: SetSizes
 };
@@ -109,7 +150,7 @@ struct Progress {
   uint64_t sequence = 0;  // number of the event
 };
 
-// Which triangulation of its vertices a mesh is; see the proto's Triangulation.
+// The kind of triangulation that a mesh is; see the proto's Triangulation.
 enum class Triangulation { kUnknown, kDelaunay, kRegular };
 
 // Why a sliver is left; see the proto's SliverReason.
@@ -122,7 +163,7 @@ struct LeftSliver {
   SliverReason reason = SliverReason::kUnknown;
 };
 
-// What became of the points and segments of a domain; see the proto's DomainStatistics.
+// Counts of the points and segments of a domain; see the proto's DomainStatistics.
 struct DomainStatistics {
   uint64_t unmeshed_points = 0;
   uint64_t segments = 0;
@@ -137,7 +178,33 @@ struct DomainStatistics {
   uint64_t first_unused_seed = 0;
 };
 
-// What was done against slivers; see the proto's SliverStatistics.
+// Counts of the triangles that bound a domain; see the proto's SurfaceStatistics.
+struct SurfaceStatistics {
+  uint64_t triangles = 0;
+  uint64_t welded_points = 0;
+  uint64_t dropped_triangles = 0;
+  uint64_t flipped_triangles = 0;
+  uint64_t unmeshed_points = 0;
+  uint64_t patches = 0;
+  uint64_t curves = 0;
+  uint64_t corners = 0;
+  uint64_t solids = 0;
+  uint64_t facets = 0;
+  uint64_t ridges = 0;
+  uint64_t lost_ridges = 0;
+  uint64_t exempt_simplices = 0;
+  uint64_t acute_curves = 0;
+  uint64_t tube_simplices = 0;
+  double min_angle_outside_deg = 0;
+  uint64_t unused_seeds = 0;
+  uint64_t first_unused_seed = 0;
+  double min_facet_angle_deg = 0;
+  double deviation_of_facets = 0;
+  double deviation_of_surface = 0;
+  std::vector<double> volumes;  // by region
+};
+
+// The repair of slivers, in figures; see the proto's SliverStatistics.
 struct SliverStatistics {
   uint64_t found = 0;
   uint64_t left = 0;
@@ -155,8 +222,9 @@ struct SliverStatistics {
 struct MeshStatistics {
   uint64_t input_points = 0;
   uint64_t duplicates = 0;
-  std::optional<DomainStatistics> domain;  // of a domain with segments
-  uint64_t merged_points = 0;              // whose vertex has other coordinates
+  std::optional<DomainStatistics> domain;    // of a domain with segments
+  std::optional<SurfaceStatistics> surface;  // of a domain that triangles bound
+  uint64_t merged_points = 0;                // whose vertex has other coordinates
   uint64_t vertices = 0;
   uint64_t simplices = 0;
   double max_radius_edge = 0;
@@ -190,7 +258,7 @@ struct Region {
   bool operator==(const Region&) const = default;
 };
 
-// What is known of a mesh before its arrays.
+// The properties of a mesh that come before its arrays.
 struct MeshHeader {
   int dimension = 0;
   std::vector<double> domain_low;
@@ -205,6 +273,7 @@ struct MeshHeader {
   // Nothing of the following where the sink does not want the boundary, or the server is too old to know of it.
   std::vector<BoundaryPart> boundary;
   uint64_t facet_count = 0;  // of all parts
+  uint64_t ridge_count = 0;  // edges on creases of a surface
   std::vector<Region> regions;
   bool has_simplex_regions = false;  // if not, all are of the only region
   bool has_vertex_marks = false;
@@ -225,6 +294,7 @@ struct Mesh {
   std::vector<uint32_t> vertex_origins;  // the number of an input point, or an origin as above
   std::vector<int32_t> vertex_tags;      // 0: inside
   std::vector<uint32_t> facets;          // facet_count x dimension, part after part
+  std::vector<uint32_t> ridges;          // ridge_count x 2, of a surface: the edges on its creases
   std::vector<BoundaryPart> boundary;
   std::vector<int32_t> simplex_regions;  // empty: all are of the only region
   std::vector<Region> regions;
@@ -232,7 +302,7 @@ struct Mesh {
   uint64_t revision = 0;  // of the session's mesh; 0: of no session
 };
 
-// How large a mesh would be.
+// The size that a mesh would have.
 struct MeshEstimate {
   uint64_t vertices = 0;
   uint64_t simplices = 0;
@@ -242,14 +312,14 @@ struct MeshEstimate {
 
 using Labels = std::map<std::string, std::string>;
 
-// What a session is created with. See the proto's CreateSessionRequest.
+// The settings of a new session. See the proto's CreateSessionRequest.
 struct SessionOptions {
   MeshOptions parameters;
   Labels labels;
   std::optional<absl::Duration> ttl;  // absent: the server's default
 };
 
-// What is changed of a session.
+// A change of a session's settings.
 struct SessionChange {
   std::optional<Labels> labels;
   std::optional<absl::Duration> ttl;
@@ -276,11 +346,14 @@ struct Session {
   std::optional<FaceRule> faces;  // none: a cloud, without segments and faces
   CrossingRule crossings = CrossingRule::kRefuse;
   std::optional<double> snap_distance{};
+  uint64_t triangle_count = 0;
+  std::optional<SurfaceFeatures>
+      surface{};              // without triangles and seeds; none: there are neither triangles nor options
   uint64_t size_count = 0;    // samples of sizes, see SetSizes
-  uint64_t stored_bytes = 0;  // of what it keeps
+  uint64_t stored_bytes = 0;  // of its points, features, sizes and mesh
 };
 
-// Which part of a list.
+// The page of a list that is asked for.
 struct PageOptions {
   std::optional<int> page_size{};  // none: as many as the server likes
   std::string page_token;          // `next_page_token` of the page before; empty: the first
@@ -318,12 +391,20 @@ struct Uploaded {
   uint64_t revision = 0;
 };
 
-// Of a session's segments and seeds, the number before the first of those that are added.
+// Of a session's segments and seeds, the number before the first that is added.
 struct FeatureOffset {
   uint64_t segments = 0;
   uint64_t seeds = 0;
 
   bool operator==(const FeatureOffset&) const = default;
+};
+
+// The same of triangles and the seeds of solids.
+struct SurfaceOffset {
+  uint64_t triangles = 0;
+  uint64_t seeds = 0;
+
+  bool operator==(const SurfaceOffset&) const = default;
 };
 
 // How many points a session has after some were removed, and its revision.
@@ -338,7 +419,7 @@ struct SizesSet {
   uint64_t revision = 0;
 };
 
-// What StartRefinement does; see the proto's StartRefinementRequest.
+// The options of StartRefinement; see the proto's StartRefinementRequest.
 struct RefinementOptions {
   std::optional<MeshOptions> parameters{};  // absent: the session's
   bool restart = false;                     // the mesh is made anew, from the session's points alone
@@ -351,7 +432,14 @@ struct AddedSegments {
   uint64_t revision = 0;
 };
 
-// Where n points lie in a mesh; see the proto's LocateResponse.
+// The same after triangles were added.
+struct AddedTriangles {
+  uint64_t triangle_count = 0;
+  uint64_t seed_count = 0;
+  uint64_t revision = 0;
+};
+
+// The places of n points in a mesh; see the proto's LocateResponse.
 struct Located {
   std::vector<uint32_t> simplices;  // n; kNoSimplex for a point in none
   std::vector<uint32_t> vertices;   // n x (dimension + 1), row-major
@@ -361,7 +449,7 @@ struct Located {
 };
 inline constexpr uint32_t kNoSimplex = 0xffff'ffff;
 
-// How Locate does it.
+// The options of Locate.
 struct LocateOptions {
   std::optional<uint64_t> revision{};  // of the mesh; none: the last one
   bool allow_outside = false;          // points in no simplex are no error
@@ -402,10 +490,10 @@ struct ServerInfo {
   absl::Duration stall_limit;
   uint64_t max_memory_bytes = 0;             // 0: no limit
   uint64_t max_stored_bytes_per_tenant = 0;  // 0: no limit
-  uint64_t stored_bytes = 0;                 // of these, what the caller's sessions keep
+  uint64_t stored_bytes = 0;                 // of these, the bytes of the caller's sessions
 };
 
-// What a server says of its health, or of that of one of its services.
+// The health of a server, or of one of its services.
 enum class Health { kUnknown, kServing, kNotServing };
 
 }  // namespace wellspace::client

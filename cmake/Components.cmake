@@ -1,4 +1,4 @@
-# What is built: builds_core, builds_client, ... and builds_all, after WELLSPACE_COMPONENTS.
+# The parts that are built: builds_core, builds_client, ... and builds_all, after WELLSPACE_COMPONENTS.
 
 set(known_components core formats client server tool python)
 set(WELLSPACE_COMPONENTS ${known_components}

@@ -1,5 +1,5 @@
-# What is installed where. Components: runtime (the tool), server, development; and python, which only packages install
-# (`cmake --install` does so with `--component python` alone, since pip is the way elsewhere).
+# The places of installed files. Components: runtime (the tool), server, development; and python, which only packages
+# install (`cmake --install` does so with `--component python` alone, since pip is the way elsewhere).
 
 if(NOT WELLSPACE_INSTALL)
   function(wellspace_install_libraries)

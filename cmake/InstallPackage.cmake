@@ -1,4 +1,4 @@
-# What find_package(wellspace) finds, and the protos, of which other languages make their clients.
+# The files that find_package(wellspace) finds, and the protos, of which other languages make their clients.
 include(CMakePackageConfigHelpers)
 
 configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/wellspace-config.cmake.in

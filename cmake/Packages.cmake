@@ -67,7 +67,7 @@ set(CPACK_DEBIAN_PYTHON_PACKAGE_CONTROL_EXTRA ${debian_dir}/python3-wellspace/po
 
 include(CPack)
 
-# What is in the packages, and nothing else.
+# The files of the packages, and no others.
 add_custom_target(wellspace_packaged)
 add_dependencies(wellspace_packaged wellspace wellspaced wellspace_help_pages wellspace_python wellspace_core
                  wellspace_client_files wellspace_formats_domain wellspace_formats_surface)

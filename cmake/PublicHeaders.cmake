@@ -1,4 +1,5 @@
-# Headers of the libraries as those see them who use an installed Wellspace: <wellspace/core/mesher.h> for core/mesher.h.
+# Headers of the libraries as those see them who use an installed Wellspace: <wellspace/core/meshers/mesher.h> for
+# core/meshers/mesher.h.
 #
 # wellspace_public_headers(NAME HEADERS…) makes them in build/…/include for the target wellspace_NAME, installs them, and
 # lets programs that have Wellspace as a subproject include them. HEADERS are paths from the root; a header that one of

@@ -7,7 +7,7 @@ target_compile_options(wellspace_options INTERFACE $<$<CXX_COMPILER_ID:Clang>:-W
 target_compile_options(wellspace_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor)
 target_include_directories(wellspace_options INTERFACE ${PROJECT_SOURCE_DIR})
 option(WELLSPACE_WERROR "Treat warnings as errors; off in a subproject" ${PROJECT_IS_TOP_LEVEL})
-# Not under sanitizers: what they add to the code makes g++ see uninitialised values and wrong bounds that are none.
+# Not under sanitizers: their additions to the code make g++ see uninitialised values and wrong bounds that are none.
 if(WELLSPACE_WERROR AND NOT WELLSPACE_SANITIZE)
   target_compile_options(wellspace_options INTERFACE -Werror)
 endif()
@@ -32,6 +32,14 @@ function(wellspace_together target)
   cmake_parse_arguments(ARG "" "" "APART" ${ARGN})
   set_target_properties(${target} PROPERTIES UNITY_BUILD ${WELLSPACE_TOGETHER} UNITY_BUILD_BATCH_SIZE 10)
   set_source_files_properties(${ARG_APART} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+endfunction()
+
+# wellspace_embed(NAME SYMBOL FILE) puts a file into wellspace_NAME, as the bytes from SYMBOL_begin to SYMBOL_end.
+function(wellspace_embed name embedded_name embedded_file)
+  set(source ${CMAKE_CURRENT_BINARY_DIR}/${embedded_name}.cc)
+  configure_file(${PROJECT_SOURCE_DIR}/cmake/embedded_file.cc.in ${source} @ONLY)
+  set_source_files_properties(${source} PROPERTIES OBJECT_DEPENDS ${embedded_file} SKIP_UNITY_BUILD_INCLUSION ON)
+  target_sources(wellspace_${name} PRIVATE ${source})
 endfunction()
 
 # wellspace_library(NAME SOURCES… [PUBLIC libs…] [PRIVATE libs…]) makes target wellspace_NAME with alias

@@ -1,5 +1,5 @@
-# Copies HEADERS, paths from ROOT joined by `|`, to INTO, and writes the project's includes in them as those who use
-# Wellspace do: "core/mesh.h" becomes "wellspace/core/mesh.h". Fails if one of these is not among PUBLIC, so that no
+# Copies HEADERS, paths from ROOT joined by `|`, to INTO, and writes the project's includes in them as programs that use
+# Wellspace do: "core/mesh/mesh.h" becomes "wellspace/core/mesh/mesh.h". Fails if one of these is not among PUBLIC, so that no
 # installed header includes one that is not.
 cmake_policy(VERSION 3.25)
 string(REPLACE "|" ";" HEADERS "${HEADERS}")

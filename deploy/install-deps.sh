@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs the Debian 12 packages that Wellspace needs. The one place with package lists.
 #
-#   deploy/install-deps.sh [GROUP…]        groups: build test interoperability solvers lint tidy fuzz node browser bench container package monitoring runtime dev; default: build test
+#   deploy/install-deps.sh [GROUP…]        groups: build test interoperability solvers lint tidy fuzz node browser bench container package monitoring kubernetes runtime dev; default: build test
 #
 # As root, or through sudo. Installs only what is missing; does not touch the network when nothing is.
 set -euo pipefail
@@ -10,13 +10,13 @@ set -euo pipefail
 declare -A packages=(
   [build]="g++ cmake ninja-build pkg-config libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
            libabsl-dev libc-ares-dev libspdlog-dev libboost-dev libtbb-dev libcli11-dev nlohmann-json3-dev
-           prometheus-cpp-dev libcairo2-dev zlib1g-dev liblzma-dev libminizip-dev libhdf5-dev
+           prometheus-cpp-dev libcairo2-dev libmetis-dev libmicrohttpd-dev zlib1g-dev liblzma-dev libminizip-dev libhdf5-dev
            libsqlite3-dev python3"
   [test]="libgtest-dev libgmock-dev libcgal-dev libeigen3-dev python3 python3-grpcio python3-meshio python3-numpy openssl
-          python3-protobuf python3-scipy python3-tqdm libisal2 mypy
+          metis python3-protobuf python3-scipy python3-tqdm libisal2 mypy
           python3-build python3-pip python3-setuptools python3-venv python3-wheel"
   [interoperability]="gmsh freefem++ python3-gmsh python3-h5py python3-meshio python3-vtk9 python3-numpy fish zsh"
-  [solvers]="calculix-ccx openfoam python3-dolfinx"
+  [solvers]="calculix-ccx openfoam python3-dolfinx python3-mpi4py python3-petsc4py"
   [lint]="git clang-format-14 python3"
   [tidy]="clang-tidy-14"
   [fuzz]="clang-14 libclang-rt-14-dev"
@@ -26,7 +26,8 @@ declare -A packages=(
   [container]="debootstrap podman buildah"
   [package]="dpkg-dev lintian groff-base debootstrap"
   [monitoring]="prometheus"
-  [runtime]="libgrpc++1.51 libprotobuf32 libabsl20220623 libspdlog1.10 libtbb12 libprometheus-cpp-core1.0 libcairo2 zlib1g
+  [kubernetes]="kubernetes-client"
+  [runtime]="libgrpc++1.51 libprotobuf32 libabsl20220623 libspdlog1.10 libtbb12 libprometheus-cpp-core1.0 libcairo2 libmetis5 libmicrohttpd12 zlib1g
              libminizip1 liblzma5 libsz2 libsqlite3-0"
 )
 packages[dev]="${packages[build]} ${packages[test]} ${packages[lint]} ${packages[tidy]} ${packages[fuzz]}"

@@ -25,7 +25,7 @@ absl::Status MeshRemotely(const std::string& address, const std::string& cloud_p
   absl::StatusOr<client::Client> client = client::Connect(address);
   if (!client.ok()) return client.status();
 
-  // A domain, and what its mesh is to be. The server forgets a session that is not used for its time to live.
+  // A domain, and the demands on its mesh. The server forgets a session that is not used for its time to live.
   client::SessionOptions options;
   options.parameters.dimension = (*cloud)->dimension();
   options.labels = {{"made-by", "session_example"}};

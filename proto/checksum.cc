@@ -19,7 +19,7 @@ namespace {
 
 constexpr uint32_t kPolynomial = 0x82F63B78;  // of RFC 3720, the lowest bit first
 
-// A linear map of checksums, by what it makes of each bit.
+// A linear map of checksums, by the images of single bits.
 using Map = std::array<uint32_t, 32>;
 
 constexpr uint32_t Apply(const Map& map, uint32_t crc) {
@@ -30,7 +30,7 @@ constexpr uint32_t Apply(const Map& map, uint32_t crc) {
   return result;
 }
 
-// What 2^exponent zero bits make of a checksum.
+// A checksum after 2^exponent zero bits.
 constexpr Map ZeroBits(int exponent) {
   Map map = {kPolynomial};
   for (int bit = 1; bit < 32; ++bit) {
@@ -46,7 +46,7 @@ constexpr Map ZeroBits(int exponent) {
   return map;
 }
 
-// A map by what it makes of each byte.
+// A map by the images of single bytes.
 class ByteMap {
  public:
   explicit constexpr ByteMap(const Map& map) {

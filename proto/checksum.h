@@ -1,4 +1,4 @@
-// The checksum of the chunks of a mesh and of uploaded points, for those who write and those who read them.
+// The checksum of the chunks of a mesh and of uploaded points, for their writers and readers.
 #ifndef WELLSPACE_PROTO_CHECKSUM_H_
 #define WELLSPACE_PROTO_CHECKSUM_H_
 

@@ -15,12 +15,13 @@ build_jobs() {
   echo $((cores < by_memory ? cores : by_memory))
 }
 
-# build PRESET TARGET [CMAKE OPTION…]: configures build/PRESET, and builds the target there; "all" is one.
+# build PRESET TARGETS [CMAKE OPTION…]: configures build/PRESET, and builds the targets there, words; "all" is one.
 build() {
-  local preset="$1" target="$2"
+  local preset="$1" targets
+  read -ra targets <<<"$2"
   shift 2
   cmake --preset "${preset}" "$@" </dev/null
-  cmake --build --preset "${preset}" --target "${target}" --parallel "$(build_jobs)" </dev/null
+  cmake --build --preset "${preset}" --target "${targets[@]}" --parallel "$(build_jobs)" </dev/null
 }
 
 # node_modules FOLDER: installs what FOLDER/package-lock.json says, if it is not there yet; fails if it cannot. Development only.

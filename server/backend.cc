@@ -10,7 +10,7 @@
 namespace wellspace::server {
 namespace {
 
-// A lease that has run out is noticed at once by those who ask for the session; its memory is free this much later.
+// Calls about a session notice at once that its lease has run out; its memory is free this much later.
 constexpr absl::Duration kExpiryInterval = absl::Seconds(1);
 
 // Files that a fault, or a death of the process, has left are looked for as often.
@@ -19,6 +19,19 @@ constexpr absl::Duration kGarbageInterval = absl::Hours(1);
 // Changes that wait for the disk at once: as many sessions can have theirs synchronised together.
 constexpr size_t kBlockingThreads = 64;
 
+// `mesh`, whose errors say which of an input's parts is to blame.
+template <typename Function>
+Function NamingParts(Function mesh) {
+  return [mesh = std::move(mesh)](const core::MeshParameters& parameters, const core::Input& input,
+                                  core::RunContext& context) {
+    auto made = mesh(parameters, input, context);
+    if (!made.ok() && input.surface.has_value()) {
+      made = OfSurface(made.status());
+    }
+    return made;
+  };
+}
+
 }  // namespace
 
 Backend::Backend(const ServiceOptions& options, const Authenticator& authenticator, Observability& observability,
@@ -26,11 +39,11 @@ Backend::Backend(const ServiceOptions& options, const Authenticator& authenticat
                  Estimator estimator, MesherFactory create_mesher, const BackendDrive& drive)
     : options_(options),
       log_(std::move(log)),
-      mesher_(std::move(mesher)),
-      estimator_(std::move(estimator)),
-      create_mesher_(std::move(create_mesher)),
+      mesher_(NamingParts(std::move(mesher))),
+      estimator_(NamingParts(std::move(estimator))),
+      create_mesher_(NamingParts(std::move(create_mesher))),
       session_log_(std::move(session_log)),
-      request_ids_(drive.clock.since_boot, *session_log_),
+      request_ids_(drive.clock.since_boot, session_log_->records()),
       memory_(options_.max_memory_bytes),
       sessions_(options_, memory_, drive.clock, *session_log_, drive.make_session_name),
       idle_sessions_(sessions_, memory_, observability.work()),
@@ -82,7 +95,7 @@ void Backend::AddMetrics(Metrics& metrics) {
   metrics.AddGauge("wellspace_sessions", "Sessions of all tenants.",
                    [this] { return static_cast<double>(sessions_.Count()); });
   metrics.AddGauge("wellspace_stored_bytes",
-                   "Points, segments, sizes and meshes that the sessions of all tenants keep.",
+                   "Points, segments, triangles, sizes and meshes that the sessions of all tenants keep.",
                    [this] { return static_cast<double>(sessions_.StoredBytes().all); });
   metrics.AddGauge("wellspace_stored_bytes_of_largest_tenant", "Of these, those of the tenant that keeps most.",
                    [this] { return static_cast<double>(sessions_.StoredBytes().most); });
@@ -99,7 +112,7 @@ void Backend::AddMetrics(Metrics& metrics) {
 }
 
 absl::Status Backend::Restore() {
-  WELLSPACE_ASSIGN_OR_RETURN(StoredSessions stored, session_log_->Load());
+  WELLSPACE_ASSIGN_OR_RETURN(StoredSessions stored, session_log_->records().Load());
   request_ids_.Restore(std::move(stored.answers));
   std::vector<ResumedOperation> resumed;
   for (const StoredSession& one : stored.sessions) {
@@ -135,34 +148,37 @@ absl::Status Backend::Restore() {
 Backend::~Backend() { background_.Stop(); }
 
 void Backend::RemoveExpired() {
-  std::vector<std::string> unlogged;
+  std::vector<SessionChange> unlogged;
   {
     const std::lock_guard lock(unlogged_mutex_);
     unlogged.swap(unlogged_);
   }
   if (!unlogged.empty()) {
-    blocking_.Run("", [this, names = std::move(unlogged)] { LogExpiries(names); });
+    blocking_.Run("", [this, deletions = std::move(unlogged)] { LogExpiries(deletions); });
   }
   for (const std::shared_ptr<Session>& session : sessions_.RemoveExpired()) {
     log_->info(LogFields().Add("event", "session_expired").Add("session", session->name()).text());
+    const auto write_down = [this, session] {
+      if (absl::IsResourceExhausted(session->LogExpiry())) {
+        const std::lock_guard lock(unlogged_mutex_);
+        unlogged_.push_back(DeletionChange(*session->state()));
+      }
+    };
     if (session_log_->is_durable()) {
-      blocking_.Run(session->name(), [this, session] {
-        if (absl::IsResourceExhausted(session->LogExpiry())) {
-          const std::lock_guard lock(unlogged_mutex_);
-          unlogged_.push_back(session->name());
-        }
-      });
+      blocking_.Run(session->name(), write_down);
+    } else {
+      write_down();
     }
   }
 }
 
-void Backend::LogExpiries(std::vector<std::string> names) {
-  const auto finds_no_room = [&](const std::string& name) {
-    return absl::IsResourceExhausted(session_log_->Commit({.session = name, .is_deletion = true}));
+void Backend::LogExpiries(const std::vector<SessionChange>& deletions) {
+  const auto finds_no_room = [&](const SessionChange& deletion) {
+    return absl::IsResourceExhausted(session_log_->Commit(deletion));
   };
-  const auto first_left = std::ranges::find_if(names, finds_no_room);
+  const auto first_left = std::ranges::find_if(deletions, finds_no_room);
   const std::lock_guard lock(unlogged_mutex_);
-  unlogged_.insert(unlogged_.end(), first_left, names.end());
+  unlogged_.insert(unlogged_.end(), first_left, deletions.end());
 }
 
 void Backend::RemoveGarbage() {

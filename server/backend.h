@@ -1,4 +1,4 @@
-// What works behind the services: workers, sessions, and all that their calls share.
+// The backend of the services: workers, sessions, and all that their calls share.
 #ifndef WELLSPACE_SERVER_BACKEND_H_
 #define WELLSPACE_SERVER_BACKEND_H_
 
@@ -27,14 +27,14 @@
 
 namespace wellspace::server {
 
-// What drives a Backend. Another than this is for tests, which decide what time it is, and what runs when.
+// The clock, the threads and the names that a Backend works with. Tests decide what time it is, and what runs when.
 struct BackendDrive {
   Clock clock{};
   RunBy run_by = RunBy::kOwnThreads;
   std::function<std::string()> make_session_name = UnguessableSessionName;
 };
 
-// Owns what a CallEnvironment names, and deletes sessions whose lease has run out.
+// Owns the parts that a CallEnvironment names, and deletes sessions whose lease has run out.
 //
 // Thread safety: thread-safe.
 // REQUIRES:   the gRPC server has ended all calls before this is destroyed.
@@ -45,10 +45,10 @@ class Backend {
           std::shared_ptr<spdlog::logger> log, std::unique_ptr<SessionLog> session_log, Mesher mesher,
           Estimator estimator, MesherFactory create_mesher, const BackendDrive& drive = {});
 
-  // Takes over what the session log has: sessions, answers, and operations that have not ended, whose work begins. To
-  // be called once, before any call is served.
+  // Takes over the contents of the session log: sessions, answers, and operations that have not ended, whose work
+  // begins. To be called once, before any call is served.
   //
-  // Errors:     those of SessionLog::Load and Commit.
+  // Errors:     as of Records::Load and Apply.
   absl::Status Restore();
 
   // Operations whose work has not ended are the next process's, if the session log is durable.
@@ -64,7 +64,7 @@ class Backend {
   void ScheduleExpiry();
   void RemoveExpired();
   // Writes down that sessions are no more which have expired when the disk had no room for it.
-  void LogExpiries(std::vector<std::string> names);
+  void LogExpiries(const std::vector<SessionChange>& deletions);
   void RemoveGarbage();
   void AddMetrics(Metrics& metrics);
 
@@ -79,10 +79,10 @@ class Backend {
   MemoryBudget memory_;
   SessionRegistry sessions_;
   std::mutex unlogged_mutex_;
-  std::vector<std::string> unlogged_;  // names of sessions that have expired and are still written down; guarded by it
+  std::vector<SessionChange> unlogged_;  // deletions of sessions that have expired, still to be made; guarded by it
   const IdleSessions idle_sessions_;
   const CallEnvironment environment_;
-  // The background thread ends first. Of the others each ends before those above it, and before what it works on.
+  // The background thread ends first. Each other ends before those above it, and before the parts that it uses.
   Background background_;
   BlockingThreads blocking_;
   JobPool jobs_;

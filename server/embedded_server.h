@@ -20,7 +20,7 @@ class EmbeddedServer {
   EmbeddedServer(const EmbeddedServer&) = delete;
   EmbeddedServer& operator=(const EmbeddedServer&) = delete;
 
-  // A channel to this server; outlives nothing: destroy it, and what was made of it, before the server.
+  // A channel to this server; outlives nothing: destroy it, and all stubs made of it, before the server.
   std::shared_ptr<grpc::Channel> Channel();
 
  private:

@@ -1,5 +1,6 @@
 #include "server/limit_flags.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -10,6 +11,7 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "server/option_sources.h"
 
 namespace wellspace::server {
 namespace {
@@ -54,10 +56,19 @@ class TomlFile final : public CLI::ConfigBase {
             absl::StrCat("--config: ", item.fullname(), " is no key; keys are the options without --"));
       }
     }
+    // The environment comes before the file; CLI11 would take the file's value and look at no variable.
+    keys.erase(
+        std::remove_if(keys.begin(), keys.end(), [this](const CLI::ConfigItem& item) { return IsInVariable(item); }),
+        keys.end());
     return keys;
   }
 
  private:
+  bool IsInVariable(const CLI::ConfigItem& item) const {
+    const std::string variable = app_.get_option("--" + item.name)->get_envname();
+    return !variable.empty() && !ValueOf(variable).empty();
+  }
+
   const CLI::App& app_;
 };
 
@@ -134,10 +145,10 @@ void DeclareLimits(CLI::App& app, ServiceOptions& service) {
       throw CLI::ValidationError(stored, absl::StrCat(text, " is no number of bytes, as 512MB or 12GB; 0: no limit"));
     }
   };
-  app.add_option_function<std::string>(
-         stored, parse_stored,
-         "Most bytes of points, segments, sizes and meshes that the sessions of one tenant keep, as 512MB or 12GB; 0: "
-         "no limit")
+  app.add_option_function<std::string>(stored, parse_stored,
+                                       "Most bytes of points, segments, triangles, sizes and meshes that the sessions "
+                                       "of one tenant keep, as 512MB or 12GB; 0: "
+                                       "no limit")
       ->type_name("SIZE")
       ->default_str(absl::StrCat(service.max_stored_bytes_per_tenant));
   AddCount(app, "--max-sessions", service.max_sessions, 1, kMany, "Most sessions at a time");
@@ -172,7 +183,11 @@ void DeclareConnections(CLI::App& app, ConnectionOptions& connections) {
 
 void DeclareConfigFile(CLI::App& app) {
   app.config_formatter(std::make_shared<TomlFile>(app));
-  app.set_config("--config", "", "Options in a TOML file: keys are the options without --; the command line wins")
+  // CLI11 looks for the file before it looks at variables, and would pass over a file that is not there.
+  const std::string file = ValueOf(VariableOf("--config"));
+  app.set_config("--config", file,
+                 "Options in a TOML file: keys are the options without --; the command line wins, then the environment",
+                 /*config_required=*/!file.empty())
       ->type_name("FILE");
   app.allow_config_extras(CLI::config_extras_mode::error);
 }

@@ -11,14 +11,15 @@
 
 namespace wellspace::server {
 
-// Declares all limits of `service`, with what it has now for defaults, and checks of their values.
+// Declares all limits of `service`, with its present values for defaults, and checks of their values.
 void DeclareLimits(CLI::App& app, ServiceOptions& service);
 
 // Declares those of `connections` likewise.
 void DeclareConnections(CLI::App& app, ConnectionOptions& connections);
 
-// --config FILE: every option of `app`, without its dashes, is a key of a TOML file; the command line wins. Keys that
-// are no option and values that an option does not take are refused, naming the key.
+// --config FILE: every option of `app`, without its dashes, is a key of a TOML file; the command line wins, then the
+// environment (DeclareVariables). Keys that are no option and values that an option does not take are refused, naming
+// the key.
 void DeclareConfigFile(CLI::App& app);
 
 // An option that takes seconds, `least` to `most`, fractions too.

@@ -5,8 +5,11 @@
 //     wellspaced check-data DIR
 //     wellspaced back-up DIR TO
 // check and copy the folder of a server, also while it serves.
+//     wellspaced --check-config
+// prints the options in force, and where they come from, and does not serve.
 //
-// Exit codes: 0 stopped by a signal, 1 cannot serve, or the folder is not whole, 2 wrong options or no token.
+// Exit codes: 0 stopped by a signal, 1 cannot serve, or the folder is not whole, 2 wrong options or no token; of
+// --check-config 0 it could serve, 1 it could not.
 #include <malloc.h>
 #include <pthread.h>
 #include <signal.h>
@@ -15,7 +18,9 @@
 #include <algorithm>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <thread>
 
 #include "CLI/CLI.hpp"
@@ -23,12 +28,14 @@
 #include "server/base/descriptor_limit.h"
 #include "server/base/options.h"
 #include "server/base/resources.h"
+#include "server/base/service_manager.h"
 #include "server/base/version.h"
 #include "server/limit_flags.h"
 #include "server/log/grpc_log.h"
 #include "server/log/log.h"
 #include "server/log/log_fields.h"
 #include "server/log/log_writer.h"
+#include "server/option_sources.h"
 #include "server/security/tokens.h"
 #include "server/server.h"
 #include "server/store/back_up.h"
@@ -49,8 +56,9 @@ struct Flags {
   absl::Duration grace = absl::Seconds(10);
   std::string log_level = "info";
   std::string log_format = "text";
-  std::string data;             // the folder of the session log; empty: sessions end with the process
-  bool is_ephemeral = false;    // they do, whatever `data` says
+  std::string data;           // the folder of the session log; empty: sessions end with the process
+  bool is_ephemeral = false;  // they do, whatever `data` says
+  bool checks_configuration = false;
   std::string hash_for_tenant;  // makes a line of tokens and does not serve
   std::string checked_folder;   // checks it and does not serve
   std::string copied_folder;    // copies it to the next and does not serve
@@ -102,6 +110,11 @@ void Declare(CLI::App& app, Flags& flags) {
                  "Address, on the loopback, of a gRPC listener with channelz; default: none")
       ->type_name("HOST:PORT");
   DeclareConfigFile(app);
+  app.add_flag(
+         "--check-config", flags.checks_configuration,
+         "Print the options in force and where each comes from, check them and the files that they name, and exit")
+      ->configurable(false);
+  DeclareVariables(app);
   app.add_subcommand("hash-token", "Print the line of --token-file for the token that is read from standard input")
       ->add_option("tenant", flags.hash_for_tenant, "Tenant whose calls show the token")
       ->required();
@@ -117,7 +130,7 @@ void Declare(CLI::App& app, Flags& flags) {
       ->required();
 }
 
-// What a server is that has just started, and its limits, given or not.
+// The log's line about a server that has just started: its addresses and its limits, given or not.
 LogFields StartOf(const Flags& flags, const Server& server) {
   const ServiceOptions& service = flags.server.service;
   const ConnectionOptions& connections = flags.server.connections;
@@ -149,7 +162,7 @@ LogFields StartOf(const Flags& flags, const Server& server) {
   return fields.Add("grace_seconds", absl::ToDoubleSeconds(flags.grace));
 }
 
-// The exit code for what has been printed to standard output: not 0 if it got lost.
+// The exit code after text was printed to standard output: not 0 if it got lost.
 int ExitOfPrinted(const std::string& what) {
   std::cout << std::flush;
   if (!std::cout) {
@@ -171,7 +184,7 @@ int HashToken(const std::string& tenant) {
   return ExitOfPrinted("the line");
 }
 
-// Prints what was found in a folder. The exit code is not 0 unless it is whole.
+// Prints the findings about a folder. The exit code is not 0 unless it is whole.
 int Report(const std::string& folder, const absl::StatusOr<DataReport>& report) {
   if (!report.ok()) {
     std::cerr << "wellspaced: " << folder << ": " << report.status().message() << std::endl;
@@ -190,9 +203,23 @@ int Report(const std::string& folder, const absl::StatusOr<DataReport>& report) 
   return report->is_whole() ? exit : 1;
 }
 
-// The session log that the flags ask for; null: none. The process ends when it fails: what is on the disk is not known
-// then, and the next start finds it out.
-absl::StatusOr<std::unique_ptr<DurableLog>> OpenSessionLog(const Flags& flags,
+// Prints the options in force. The exit code is 0 if a server could start with them, as far as that can be told
+// without listening or opening the folder of sessions.
+int CheckConfiguration(const CLI::App& app, const Flags& flags, int argc, const char* const* argv) {
+  std::cout << DescribeOptions(app, argc, argv);
+  const int exit = ExitOfPrinted("the options");
+  const absl::Status status =
+      Server::Check(flags.server, MakeLogger("off", LogFormat::kText, std::make_shared<LogWriter>(STDERR_FILENO)));
+  if (!status.ok()) {
+    std::cerr << "wellspaced: " << status.message() << std::endl;
+    return 1;
+  }
+  return exit;
+}
+
+// The session log that the flags ask for; null: none. The process ends when it fails: the contents of the disk are
+// unknown then, and the next start finds them out.
+absl::StatusOr<std::unique_ptr<SessionLog>> OpenSessionLog(const Flags& flags,
                                                            const std::shared_ptr<spdlog::logger>& log) {
   if (flags.data.empty() || flags.is_ephemeral) {
     return nullptr;
@@ -202,10 +229,10 @@ absl::StatusOr<std::unique_ptr<DurableLog>> OpenSessionLog(const Flags& flags,
     log->flush();
     _exit(1);
   };
-  return DurableLog::Open({.folder = flags.data,
-                           .on_failure = on_failure,
-                           .ballast_bytes = BallastBytesFor(flags.data),
-                           .max_written_files = MaxWrittenFiles(DescriptorLimit())});
+  return OpenDurableLog({.folder = flags.data,
+                         .on_failure = on_failure,
+                         .ballast_bytes = BallastBytesFor(flags.data),
+                         .max_written_files = MaxWrittenFiles(DescriptorLimit())});
 }
 
 // SIGTERM and SIGINT, blocked in this thread and all that it starts later, to be waited for.
@@ -231,11 +258,48 @@ class StopSignals {
   sigset_t set_;
 };
 
-// Keeps little of what is freed from the system.
+// Bounds the freed memory that is kept from the system.
 void BoundHeaps(const Resources& resources) {
   mallopt(M_MMAP_THRESHOLD, kReturnedBytes);
-  // Each heap keeps what was freed of it. The default is eight for each processor, where no more than one can be used.
+  // Each heap keeps its freed memory. The default is eight for each processor, where no more than one can be used.
   mallopt(M_ARENA_MAX, std::max(2, resources.processors));
+}
+
+// Tells the program that started the process that it serves, and where.
+void TellOfStart(const Server& server) {
+  std::cout << "listening on " << server.address() << std::endl;
+  const Observability& observability = server.observability();
+  if (!observability.metrics_address().empty()) {
+    std::cout << "metrics on " << observability.metrics_address() << std::endl;
+  }
+  if (!observability.admin_address().empty()) {
+    std::cout << "admin on " << observability.admin_address() << std::endl;
+  }
+  TellServiceManager("READY=1");
+}
+
+// Parses the command line, the environment and the file of options. An exit code: the process is to end with it.
+std::optional<int> Parse(CLI::App& app, int argc, char** argv) {
+  // The flag is looked for here, since nothing is parsed yet when this fails.
+  const bool checks = std::any_of(argv + 1, argv + argc,
+                                  [](const char* argument) { return std::string_view(argument) == "--check-config"; });
+  const int wrong = checks ? 1 : kExitWrongOptions;
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (app.exit(error) == 0) {
+      return ExitOfPrinted("the text");
+    }
+    if (const std::string variable = VariableBehind(app, error.what(), argc, argv); !variable.empty()) {
+      std::cerr << "The value comes from " << variable << " in the environment." << std::endl;
+    }
+    return wrong;
+  }
+  if (const absl::Status status = CheckVariables(app, environ); !status.ok()) {
+    std::cerr << "wellspaced: " << status.message() << std::endl;
+    return wrong;
+  }
+  return std::nullopt;
 }
 
 int Main(int argc, char** argv) {
@@ -249,10 +313,11 @@ int Main(int argc, char** argv) {
   flags.server.service.max_memory_bytes = DefaultMaxMemory(resources);
   CLI::App app("Makes quality meshes of point clouds and planar domains, as a gRPC service.", "wellspaced");
   Declare(app, flags);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? ExitOfPrinted("the text") : kExitWrongOptions;
+  if (const std::optional<int> exit = Parse(app, argc, argv); exit.has_value()) {
+    return *exit;
+  }
+  if (flags.checks_configuration) {
+    return CheckConfiguration(app, flags, argc, argv);
   }
   if (!flags.hash_for_tenant.empty()) {
     return HashToken(flags.hash_for_tenant);
@@ -272,7 +337,7 @@ int Main(int argc, char** argv) {
       MakeLogger(flags.log_level, flags.log_format == "json" ? LogFormat::kJson : LogFormat::kText,
                  std::make_shared<LogWriter>(STDERR_FILENO));
   const GrpcLog grpc_log(log);
-  absl::StatusOr<std::unique_ptr<DurableLog>> session_log = OpenSessionLog(flags, log);
+  absl::StatusOr<std::unique_ptr<SessionLog>> session_log = OpenSessionLog(flags, log);
   if (!session_log.ok()) {
     std::cerr << "wellspaced: --data " << flags.data << ": " << session_log.status().message() << std::endl;
     return 1;
@@ -283,16 +348,10 @@ int Main(int argc, char** argv) {
     return 1;
   }
   log->info("{}", StartOf(flags, **server).text());
-  std::cout << "listening on " << (*server)->address() << std::endl;
-  const Observability& observability = (*server)->observability();
-  if (!observability.metrics_address().empty()) {
-    std::cout << "metrics on " << observability.metrics_address() << std::endl;
-  }
-  if (!observability.admin_address().empty()) {
-    std::cout << "admin on " << observability.admin_address() << std::endl;
-  }
+  TellOfStart(**server);
 
   const int received = signals.Wait();
+  TellServiceManager("STOPPING=1");
   log->info("event=stopping signal={} grace={}", received, absl::FormatDuration(flags.grace));
   signals.Release();
   (*server)->Shutdown(flags.grace);

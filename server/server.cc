@@ -19,7 +19,7 @@
 #include "server/base/clock.h"
 #include "server/network/compression.h"
 #include "server/network/listen_address.h"
-#include "server/store/ephemeral_log.h"
+#include "server/store/session_log.h"
 
 namespace wellspace::server {
 namespace {
@@ -33,10 +33,10 @@ constexpr int kMinClientPingMs = 10'000;
 // off.
 constexpr std::chrono::milliseconds kFarewell(500);
 
-// Most that gRPC holds of what comes in, all connections together. It looks at the length of a message when all of it
+// Most bytes of requests that gRPC holds, all connections together. It looks at the length of a message when all of it
 // has come, from any peer; here it ends calls, one of each connection, the oldest first. Half of the limit of memory is
 // as much as all messages that the budget makes room for, never so little that hundreds of clients that behave come
-// near it, and never so much that strangers could take what the limit leaves to others.
+// near it, and never so much that strangers could take the memory that the limit leaves to others.
 size_t MostReceived(const ServiceOptions& options) {
   constexpr uint64_t kMostReceivedBytes = uint64_t{1} << 30;
   return options.max_memory_bytes == 0
@@ -44,7 +44,7 @@ size_t MostReceived(const ServiceOptions& options) {
              : std::clamp(options.max_memory_bytes / 2, kLeastReceivedBytes, kMostReceivedBytes);
 }
 
-// What is read from a connection before anything is done with it. gRPC would read up to 4 MiB, in which 140 000 calls
+// Most bytes that are read from a connection before any is handled. gRPC would read up to 4 MiB, in which 140 000 calls
 // begin and are given up, before Connections hears of the first.
 constexpr int kMostReadAtOnce = 16 * 1024;
 
@@ -66,6 +66,16 @@ void EnableHealthAndReflection() {
 }
 
 }  // namespace
+
+absl::Status Server::Check(const ServerOptions& options, std::shared_ptr<spdlog::logger> log) {
+  WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<Security> security,
+                             Security::Load(options.security, std::move(log)));
+  if (!options.listen.empty()) {
+    WELLSPACE_ASSIGN_OR_RETURN(const ListenAddress address, ParseListenAddress(options.listen));
+    WELLSPACE_RETURN_IF_ERROR(security->CheckAddress(address));
+  }
+  return Observability::Check(options.observability);
+}
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& options, std::shared_ptr<spdlog::logger> log,
                                                       std::unique_ptr<SessionLog> session_log, Mesher mesher,
@@ -96,7 +106,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& optio
   }
 
   if (session_log == nullptr) {
-    session_log = std::make_unique<EphemeralLog>();
+    session_log = MakeEphemeralLog();
   }
   const bool keeps_files = session_log->is_durable();
   std::unique_ptr<Server> server(new Server(options, std::move(security), std::move(log), std::move(session_log),

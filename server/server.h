@@ -27,7 +27,7 @@
 
 namespace wellspace::server {
 
-// What a connection may take. Durations are at least a second.
+// The limits of a connection. Durations are at least a second.
 struct ConnectionOptions {
   absl::Duration handshake_timeout = absl::Seconds(20);  // from its acceptance to the first settings of HTTP/2
   absl::Duration max_idle = absl::Minutes(15);           // without any call
@@ -48,7 +48,7 @@ struct ServerOptions {
 class Server {
  public:
   // Starts to serve, and goes on with what `session_log` has: sessions, and operations that have not ended. Null: an
-  // EphemeralLog. Tests put other work in the place of the core's.
+  // MakeEphemeralLog. Tests put other work in the place of the core's.
   //
   // Errors:     INVALID_ARGUMENT (listen), those of Security::Load and AddAcceptor, of Listener::Open, of
   //             Observability::ListenForHttp and ListenForAdmin, and of Backend::Restore.
@@ -58,6 +58,12 @@ class Server {
                                                        Mesher mesher = core::MeshPoints,
                                                        Estimator estimator = core::EstimateMesh,
                                                        MesherFactory create_mesher = core::Mesher::Create);
+
+  // Whether a server could start with `options`, as far as that can be told without listening: reads tokens,
+  // certificates and keys, and holds all addresses to the rules.
+  //
+  // Errors:     those of Start about options and files.
+  static absl::Status Check(const ServerOptions& options, std::shared_ptr<spdlog::logger> log);
 
   // Shuts down at once.
   ~Server();

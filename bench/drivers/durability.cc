@@ -1,7 +1,7 @@
-// What it costs that nothing is lost: commits, uploads, starts, meshes in files, and calls beside uploads. Prints a
+// The cost of losing nothing: commits, uploads, starts, meshes in files, and calls beside uploads. Prints a
 // table.
 //
-//   bench_durability FOLDER     on whose disk; what is written there is removed again
+//   bench_durability FOLDER     on the disk to be measured; its files are removed again
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -50,10 +50,12 @@ Value Get(absl::StatusOr<Value> value) {
   return *std::move(value);
 }
 
-std::unique_ptr<DurableLog> OpenLog(const std::string& folder) { return Get(DurableLog::Open({.folder = folder})); }
+std::unique_ptr<SessionLog> OpenLog(const std::string& folder) { return Get(OpenDurableLog({.folder = folder})); }
 
-SessionChange MakeCreation(uint64_t number) {
-  SessionChange change{.session = absl::StrCat("sessions/", absl::Hex(number, absl::kZeroPad16))};
+SessionChange MakeCreation(SessionLog& log, uint64_t number) {
+  SessionChange change{.session = absl::StrCat("sessions/", absl::Hex(number, absl::kZeroPad16)),
+                       .epoch = log.records().epoch(),
+                       .is_creation = true};
   store::v1::SessionRecord& state = change.state.emplace();
   state.set_name(change.session);
   state.set_tenant("tenant");
@@ -76,7 +78,7 @@ void MeasureCommits(const std::string& folder, int threads) {
   for (int thread = 0; thread < threads; ++thread) {
     writers.emplace_back([&, thread] {
       for (uint64_t i = 0; SecondsSince(start) < kSeconds; ++i) {
-        const SessionChange change = MakeCreation(uint64_t{1'000'000} * (thread + 1) + i);
+        const SessionChange change = MakeCreation(*log, uint64_t{1'000'000} * (thread + 1) + i);
         const auto begun = Clock::now();
         Check(log->Commit(change));
         times[thread].push_back(SecondsSince(begun));
@@ -99,9 +101,9 @@ void MeasureCommits(const std::string& folder, int threads) {
 // Messages of 1 MiB, synchronised and committed every 16 MiB, as the service does.
 void MeasureUpload(const std::string& folder) {
   const auto log = OpenLog(folder);
-  SessionChange change = MakeCreation(1);
+  SessionChange change = MakeCreation(*log, 1);
   Check(log->Commit(change));
-  const auto points = log->OpenPoints(change.session, 3, 0, {});
+  const auto points = log->files().OpenPoints({.session = change.session, .dimension = 3});
   const std::vector<double> message(3 * 43'690, 0.5);
   const auto start = Clock::now();
   uint64_t bytes = 0;
@@ -113,6 +115,7 @@ void MeasureUpload(const std::string& folder) {
     Check(points->Synchronize());
     change.state->set_points(points->coordinate_count() / 3);
     change.answer.reset();
+    change.is_creation = false;
     change.steps.assign(1, {});
     change.steps[0].mutable_points()->set_count(message.size() * 16 / 3);
     Check(log->Commit(change));
@@ -129,7 +132,7 @@ void MeasureStart(const std::string& folder, uint64_t sessions) {
     for (int thread = 0; thread < 64; ++thread) {
       writers.emplace_back([&] {
         for (uint64_t number = next++; number < sessions; number = next++) {
-          SessionChange change = MakeCreation(number);
+          SessionChange change = MakeCreation(*log, number);
           change.steps.resize(4);
           change.operations.resize(2);
           change.operations[1].set_number(1);
@@ -143,7 +146,7 @@ void MeasureStart(const std::string& folder, uint64_t sessions) {
   }
   const auto start = Clock::now();
   const auto log = OpenLog(folder);
-  const size_t loaded = Get(log->Load()).sessions.size();
+  const size_t loaded = Get(log->records().Load()).sessions.size();
   const double seconds = SecondsSince(start);
   Get(log->RemoveGarbage());
   std::printf("start, %zu sessions %7.3f s; with garbage %.3f s; database %.1f MB\n", loaded, seconds,
@@ -199,7 +202,7 @@ void MeasureMesh(const std::string& folder) {
   const core::Mesh mesh = MakeLargeMesh();
   const double megabytes = static_cast<double>(mesh.points.size() * 8 + mesh.simplices.size() * 4) / 1e6;
   auto start = Clock::now();
-  const auto file = Get(log->KeepMesh("sessions/1", 1, mesh, core::RunContext()));
+  const auto file = Get(log->files().KeepMesh("sessions/1", 1, /*epoch=*/0, mesh, core::RunContext()));
   std::printf("mesh of 10^6 simplices, %.0f MB: kept in %.3f s", megabytes, SecondsSince(start));
   start = Clock::now();
   Get(file->Load(core::RunContext()));

@@ -36,7 +36,7 @@ std::vector<double> ReadPoints(const std::string& path) {
 }
 
 Meter::Meter(int threads) : is_one_thread_(threads == 1) {
-  // Sets the high-water mark to what is resident now.
+  // Sets the high-water mark to the memory resident now.
   std::ofstream("/proc/self/clear_refs") << "5";
   resident_ = StatusBytes("VmRSS:");
   start_ = std::chrono::steady_clock::now();

@@ -1,4 +1,4 @@
-// What every measured program shares: points from a file, and the time and memory of what it does with them.
+// The common part of measured programs: points from a file, and the time and memory of the work on them.
 #ifndef WELLSPACE_BENCH_DRIVERS_METER_H_
 #define WELLSPACE_BENCH_DRIVERS_METER_H_
 
@@ -24,7 +24,7 @@ class Meter {
   // more, the wall clock's.
   double Seconds() const;
   double WallSeconds() const;
-  // The most that was resident at once, less what was when the meter was made: the input does not count, the output
+  // The most that was resident at once, less that when the meter was made: the input does not count, the output
   // does. From the process' own high-water mark; that of rusage also knows the process that forked this one.
   uint64_t PeakBytes() const;
 

@@ -15,13 +15,13 @@
 #include <vector>
 
 #include "bench/drivers/floor.h"
-#include "core/domain.h"
 #include "core/geometry/power_predicate.h"
-#include "core/mesh_locator.h"
-#include "core/mesh_parameters.h"
-#include "core/mesher.h"
+#include "core/input/frame.h"
+#include "core/input/mesh_parameters.h"
+#include "core/input/sorted_cloud.h"
+#include "core/mesh/mesh_locator.h"
+#include "core/meshers/mesher.h"
 #include "core/refine/refine.h"
-#include "core/sorted_cloud.h"
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::bench {
@@ -52,11 +52,11 @@ std::vector<double> UniformPoints(int dimension, int64_t count) {
 }
 
 template <int D>
-core::Domain<D> UnitDomain() {
+core::Frame<D> UnitDomain() {
   core::Box<D> box;
   box.low.fill(0);
   box.high.fill(1);
-  auto domain = core::Domain<D>::Of(box);
+  auto domain = core::Frame<D>::Of(box);
   ExitUnless(domain.status());
   return *domain;
 }
@@ -190,7 +190,7 @@ void BM_ClippedCellOfInput(benchmark::State& state) {
   ComputeClippedCells<D>(state, false);
 }
 
-// Those of all random points along the Z curve, by one call. Items are vertices.
+// The cells of all random points along the Z curve, by one call. Items are vertices.
 template <int D>
 void BM_ClippedCellsOfInput(benchmark::State& state) {
   const core::QueryStructure<D> structure = Structure<D>(state.range(0), false);

@@ -47,7 +47,7 @@ void Fill(const std::vector<double>& points, tetgenio& in) {
   }
 }
 
-// Sends what is printed to stdout into a file, as long as it lives.
+// Sends text for stdout into a file, as long as it lives.
 class Capture {
  public:
   Capture() : stdout_(dup(STDOUT_FILENO)), file_(std::tmpfile()) {

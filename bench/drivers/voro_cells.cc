@@ -10,7 +10,7 @@
 
 namespace {
 
-// What voro++ recommends to put into a block of its grid.
+// The points in a block of the grid that voro++ recommends.
 constexpr double kPointsPerBlock = 5.6;
 
 }  // namespace

@@ -12,8 +12,8 @@
 #include "CLI/Config.hpp"
 #include "CLI/Formatter.hpp"
 #include "bench/drivers/meter.h"
-#include "core/domain.h"
-#include "core/sorted_cloud.h"
+#include "core/input/frame.h"
+#include "core/input/sorted_cloud.h"
 #include "core/voronoi/query_structure.h"
 #include "nlohmann/json.hpp"
 
@@ -53,7 +53,7 @@ int Main(int argc, char** argv) {
 
   const core::RunContext context;
   const Meter all;
-  const auto domain = core::Domain<3>::Of({{0, 0, 0}, {1, 1, 1}});
+  const auto domain = core::Frame<3>::Of({{0, 0, 0}, {1, 1, 1}});
   ExitUnless(domain.status());
   auto cloud = core::SortCloud<3>(*domain, points, 1, context);
   ExitUnless(cloud.status());

@@ -16,7 +16,7 @@
 #include "absl/strings/str_cat.h"
 #include "bench/drivers/floor.h"
 #include "bench/drivers/meter.h"
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "core/validate/validate.h"
 #include "core/validate/validate_domain.h"
 #include "nlohmann/json.hpp"

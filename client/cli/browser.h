@@ -6,7 +6,7 @@
 
 namespace wellspace::cli {
 
-// Starts what shows the file `path`, and does not wait for it: the first program of $BROWSER; without one xdg-open,
+// Starts a viewer of the file `path`, and does not wait for it: the first program of $BROWSER; without one xdg-open,
 // where there is a display. Returns whether a program was started.
 //
 // Threads:    reads the environment.

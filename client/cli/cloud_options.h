@@ -1,4 +1,4 @@
-// The options that say how a file of points is read, and what is told of how it was.
+// The options that say how a file of points is read, and the notes on how it was.
 #ifndef WELLSPACE_CLIENT_CLI_CLOUD_OPTIONS_H_
 #define WELLSPACE_CLIENT_CLI_CLOUD_OPTIONS_H_
 
@@ -19,7 +19,7 @@ namespace wellspace::cli {
 void AddCloudOptions(CLI::App& command, formats::CloudOptions& options, const std::string& what = "IN",
                      const std::vector<std::string>& more_formats = {});
 
-// What was found while a cloud was read: which columns were taken, what was not used, how many points were skipped.
+// Findings while a cloud was read: the columns taken, the parts of the file not used, the number of points skipped.
 struct CloudReport {
   std::vector<std::string> notes = {};
   std::optional<uint64_t> skipped_points = {};  // if they were to be skipped

@@ -29,7 +29,7 @@ std::vector<std::string> NamesOf(const CLI::Option& option);
 // The values of an option that has a few only; else none.
 std::vector<std::string> ChoicesOf(const CLI::Option& option);
 
-// What stands for the value of an option: its type, or its choices as a|b.
+// The word for the value of an option: its type, or its choices as a|b.
 std::string ValueOf(const CLI::Option& option);
 
 }  // namespace wellspace::cli

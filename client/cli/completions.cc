@@ -18,9 +18,10 @@ std::string Quoted(const std::string& text) {
 
 // The alternatives of bash's `case` statements in the script.
 struct CompletionCases {
-  // What follows an option: one of its choices (by the choices, joined), a file, or a value that is not completed.
+  // The kind of word after an option: one of its choices (by the choices, joined), a file, or a value that is not
+  // completed.
   void AddOption(const std::string& command, const CLI::Option& option);
-  // The command's word, its options, and what else may follow it.
+  // The command's word, its options, and other words that may follow it.
   void AddCommand(const Command& command);
 
   std::vector<std::string> names;
@@ -133,7 +134,7 @@ std::vector<std::string> QuotedNames(const std::vector<Command>& commands) {
   return names;
 }
 
-// What follows an option or stands for a positional in a specification of zsh's _arguments.
+// The word after an option or for a positional in a specification of zsh's _arguments.
 std::string ZshValue(const CLI::Option& option) {
   const std::vector<std::string> choices = ChoicesOf(option);
   const std::string name = option.get_positional() ? option.get_name(true) : "value";
@@ -216,7 +217,7 @@ std::string FishQuoted(const std::string& text) {
   return absl::StrCat("'", absl::StrReplaceAll(text, {{"\\", "\\\\"}, {"'", "\\'"}}), "'");
 }
 
-// What the shell offers for the value of an option or a positional.
+// The offers of the shell for the value of an option or a positional.
 std::string FishValue(const CLI::Option& option) {
   const std::vector<std::string> choices = ChoicesOf(option);
   return !choices.empty() ? absl::StrCat(" -a ", FishQuoted(absl::StrJoin(choices, " "))) : IsFile(option) ? " -F" : "";

@@ -7,8 +7,8 @@
 
 namespace wellspace::cli {
 
-// Each completes commands, options, the values of options that have few, and names of files; those of zsh and fish also
-// show the descriptions.
+// Each completes commands, options, the values of options that have few, and names of files; scripts of zsh and fish
+// also show the descriptions.
 std::string BashCompletion(const CLI::App& app);
 std::string ZshCompletion(const CLI::App& app);
 std::string FishCompletion(const CLI::App& app);

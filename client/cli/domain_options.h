@@ -38,8 +38,10 @@ class DomainOptions {
   // Whether `path`, or the format that is given, has segments.
   bool IsDomain(const std::string& path, const std::string& format) const;
 
-  // Refuses options that want segments beside a cloud, which is what the error says.
+  // Refuses options that want segments beside a cloud, as the error says.
   absl::Status CheckCloud(const std::string& cloud = "IN") const;
+  // The same beside something else; `what` says what is there, and what to give.
+  absl::Status CheckOther(const std::string& what) const;
 
   // Reads the domain, by the format and the columns that are given; its points alone are returned, with their origins,
   // and its segments are kept.
@@ -47,23 +49,23 @@ class DomainOptions {
   // Errors:     those of formats::ReadPlanarDomain.
   absl::StatusOr<formats::PointCloud> Read(const std::string& path, const formats::CloudOptions& options);
 
-  // Whether what has been read tells the markers of segments, and the regions of faces: GeoJSON does by a property.
+  // Whether the domain read tells the markers of segments, and the regions of faces: GeoJSON does by a property.
   //
   // REQUIRES:   Read is OK.
   bool KnowsMarkers() const { return domain_->places.empty() || !reading_.marker_property.empty(); }
   bool KnowsRegions() const { return domain_->places.empty() || !reading_.region_property.empty(); }
 
-  // What has been read; null before.
+  // The domain that has been read; null before.
   const std::shared_ptr<const client::Features>& features() const { return features_; }
 
-  // What the server has before what was read.
+  // The part that the server has before the one that was read.
   struct Before {
     uint64_t points = 0;
     client::FeatureOffset features = {};
   };
   // `status`, with the places in the file of the points, segments and seeds that it names.
   absl::Status WithOrigins(const absl::Status& status, const Before& before) const;
-  // What a mesh of the domain tells of its seeds, a sentence each: those that mean nothing.
+  // Notes of a mesh of the domain on its seeds, a sentence each: seeds that mean nothing.
   //
   // REQUIRES:   Read is OK.
   std::vector<std::string> NotesOf(const std::optional<client::DomainStatistics>& statistics) const;

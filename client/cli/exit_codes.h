@@ -1,4 +1,4 @@
-// What the tool tells the shell.
+// The exit codes of the tool.
 #ifndef WELLSPACE_CLIENT_CLI_EXIT_CODES_H_
 #define WELLSPACE_CLIENT_CLI_EXIT_CODES_H_
 
@@ -21,7 +21,7 @@ extern const char kExitCodesHelp[];
 
 int ExitCodeOf(const absl::Status& status);
 
-// How results and errors are printed.
+// The format in which results and errors are printed.
 enum class OutputFormat { kText, kJson };
 
 // Prints an error on standard error and returns its exit code. As JSON: {"error": {"code", "reason", "field",

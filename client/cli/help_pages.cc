@@ -14,7 +14,7 @@
 namespace wellspace::cli {
 namespace {
 
-// What a page consists of. Texts are plain but for words in backticks, which are names that the reader types.
+// The parts of a page. Texts are plain but for words in backticks, which are names that the reader types.
 class Page {
  public:
   virtual ~Page() = default;
@@ -22,7 +22,7 @@ class Page {
   virtual void CommandHeading(const std::string& synopsis) = 0;
   virtual void Paragraph(const std::string& text) = 0;
   virtual void Verbatim(const std::string& text) = 0;
-  // Entries follow one another in a list, which EndList ends. `value` is what follows the names; it may be empty.
+  // Entries follow one another in a list, which EndList ends. `value` follows the names; it may be empty.
   virtual void Entry(const std::vector<std::string>& names, const std::string& value, const std::string& text) = 0;
   virtual void EndList() = 0;
 
@@ -209,7 +209,7 @@ std::string Summary(const CLI::App& app) {
 
 std::string ManualPage(const CLI::App& app, const std::string& version) {
   ManPage page(absl::StrCat(".TH WELLSPACE 1 \"\" \"wellspace ", version,
-                            "\" \"User Commands\"\n.SH NAME\nwellspace \\- ", Summary(app),
+                            "\" \"User Commands\"\n.ad l\n.SH NAME\nwellspace \\- ", Summary(app),
                             "\n.SH SYNOPSIS\n\\fBwellspace\\fR \\fIcommand\\fR [\\fIoptions\\fR]\n"));
   DescribeTool(app, page);
   page.Heading("See also");

@@ -1,4 +1,4 @@
-// What is told of the tool elsewhere than in --help, made of the same descriptions; completions.h has the shells.
+// Pages about the tool beside --help, made of the same descriptions; completions.h has the shells.
 #ifndef WELLSPACE_CLIENT_CLI_HELP_PAGES_H_
 #define WELLSPACE_CLIENT_CLI_HELP_PAGES_H_
 

@@ -9,7 +9,7 @@
 namespace wellspace::cli {
 
 // The number of threads to ask for when `points` are meshed and the user has not said how many. Small meshes are faster
-// on one: what threads do ahead there seldom holds. Servers take no more than they allow, so that cores need not be
+// on one: work done ahead is seldom valid there. Servers take no more than they allow, so that cores need not be
 // counted here. The mesh does not depend on it.
 //
 // Shapes:     rows of options.dimension coordinates.

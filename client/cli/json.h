@@ -1,46 +1,25 @@
-// What the tool prints with --output json.
+// The output of the tool with --output json: the names of client/json in the tool.
 #ifndef WELLSPACE_CLIENT_CLI_JSON_H_
 #define WELLSPACE_CLIENT_CLI_JSON_H_
 
-#include <nlohmann/json.hpp>
-#include <string>
-
-#include "absl/status/status.h"
-#include "client/client.h"
+#include "client/json/json.h"
 
 namespace wellspace::cli {
 
-using Json = nlohmann::ordered_json;
-
-// Times are RFC 3339 in UTC, durations seconds, names of states lower case. Absent: null.
-
-// `json` as text that a terminal does not obey: control characters are escaped, bytes that are no UTF-8 replaced.
-std::string JsonText(const Json& json, bool indented);
-
-// code, reason and field (where the server gave one), message.
-Json ErrorJson(const absl::Status& status);
-// dimension, rho, criterion, max_circumradius, edge_length, gradation, size_boxes, min_dihedral, pump_weights,
-// keep_vertices, domain_low, domain_high, margin, merge_distance, max_vertices, threads.
-Json ParametersJson(const client::MeshOptions& parameters);
-// name, state, parameters, labels, ttl_seconds, create_time, expire_time, revision, committed_points, segment_count,
-// seed_count, faces (a name, or null for a cloud), crossings (likewise), size_count, stored_bytes, vertex_count,
-// simplex_count, last_operation.
-Json SessionJson(const client::Session& session);
-// sequence, phase, vertices, estimated_vertices, simplices, fraction.
-Json ProgressJson(const client::Progress& progress);
-// name, state, parameters, progress, error, create_time, start_time, end_time, mesh_revision.
-Json OperationJson(const client::Operation& operation);
-// Every field of client::ServerInfo.
-Json ServerInfoJson(const client::ServerInfo& info);
-
-// "open", "running" and so on.
-const char* StateName(client::SessionState state);
-const char* StateName(client::OperationState state);
-// As --faces has it.
-const char* FaceRuleName(client::FaceRule rule);
-const char* CrossingRuleName(client::CrossingRule rule);
-// "2026-01-31T23:59:59Z".
-std::string TimeText(absl::Time time);
+using client::CriterionName;
+using client::CrossingRuleName;
+using client::ErrorJson;
+using client::FaceRuleName;
+using client::Json;
+using client::JsonText;
+using client::OperationJson;
+using client::ParametersJson;
+using client::ProgressJson;
+using client::ServerInfoJson;
+using client::SessionJson;
+using client::SolidRuleName;
+using client::StateName;
+using client::TimeText;
 
 }  // namespace wellspace::cli
 

@@ -1,13 +1,15 @@
 #include "client/cli/mesh_paths.h"
 
+#include <algorithm>
+
 #include "absl/strings/str_cat.h"
-#include "client/cli/render/picture_format.h"
 #include "client/formats/domain/read_planar_domain.h"
 #include "client/formats/io/open_input.h"
 #include "client/formats/read_cloud.h"
 #include "client/formats/read_mesh.h"
 #include "client/formats/registry.h"
 #include "client/formats/write_mesh.h"
+#include "client/render/picture_format.h"
 
 namespace wellspace::cli {
 namespace {
@@ -37,6 +39,25 @@ absl::StatusOr<formats::Mesh> ReadMeshInput(const std::string& path) {
     }
   }
   return formats::ReadMesh(path);
+}
+
+void MarkVertices(bool always, formats::Mesh& mesh) {
+  const uint64_t vertices = mesh.View().vertex_count();
+  const bool has_origins = mesh.vertex_origins.size() == vertices;
+  if (mesh.boundary.empty() || (!has_origins && !always)) {
+    mesh.vertex_origins.clear();
+    mesh.vertex_tags.clear();
+    return;
+  }
+  mesh.vertex_origins.resize(vertices, formats::kSteinerOrigin);
+  mesh.vertex_tags.assign(vertices, 0);
+  size_t corner = 0;
+  for (const formats::BoundaryPart& part : mesh.boundary) {
+    for (const size_t end = corner + part.facets * mesh.dimension; corner < end; ++corner) {
+      int32_t& tag = mesh.vertex_tags[mesh.facets[corner]];
+      tag = tag == 0 ? part.tag : std::min(tag, part.tag);
+    }
+  }
 }
 
 absl::Status CheckMeshOutput(const std::string& path, const std::string& format, int dimension, bool may_have_weights) {

@@ -1,4 +1,4 @@
-// Files of meshes that commands are given; and what is said of files that are none.
+// Files of meshes that commands are given; and the errors about files that are none.
 #ifndef WELLSPACE_CLIENT_CLI_MESH_PATHS_H_
 #define WELLSPACE_CLIENT_CLI_MESH_PATHS_H_
 
@@ -12,8 +12,12 @@ namespace wellspace::cli {
 
 // Reads the mesh of `path` as formats::ReadMesh does.
 //
-// Errors:     of a cloud, a domain or a picture, by their extensions, what the file is and which command is for it.
+// Errors:     for a cloud, a domain or a picture, by extension, they name the kind of file and the command for it.
 absl::StatusOr<formats::Mesh> ReadMeshInput(const std::string& path);
+
+// Gives vertices of a mesh with a boundary their tags, the least of the facets at each. If `always`, origins that are
+// not known are those of Steiner vertices; otherwise such a mesh gets neither.
+void MarkVertices(bool always, formats::Mesh& mesh);
 
 // Tells early whether a mesh cannot be written to `path`, as formats::CheckMeshOutput does.
 //

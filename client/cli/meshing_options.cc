@@ -20,7 +20,9 @@ const char kCloudsHelp[] =
     "\"-\" is\n"
     "         standard input (csv, or --input-format)\n"
     "Domains: in 2-D, .poly (Triangle's, with .node), .geojson, .geojsonl, .ndjson, .wkt and .shp; with --segments\n"
-    "         lines of .obj, polylines of .csv and boundaries of .14 (ADCIRC)\n";
+    "         lines of .obj, polylines of .csv and boundaries of .14 (ADCIRC)\n"
+    "         in 3-D, the inside of a surface: .stl (--as-points: a cloud), .smesh and 3-D .poly (TetGen's);\n"
+    "         faces of .obj, .ply and .off with --triangles\n";
 
 const char kMeshesHelp[] =
     "Meshes:  .vtu, .vtkhdf, .vtk, .xdmf (with .h5), .msh (Gmsh 4.1; --format msh22: 2.2), .mesh (MEDIT), .su2 and\n"
@@ -28,6 +30,12 @@ const char kMeshesHelp[] =
     "         .14 (ADCIRC) and .2dm (SMS), 2-D;\n"
     "         \"-\" is standard output (vtu).\n"
     "         Each has the boundary: the faces xmin, xmax, ymin, ... of the box are tagged 1, 2, 3, ...\n";
+
+std::vector<std::string> InputFormats() {
+  std::vector<std::string> formats = formats::DomainOnlyFormats();
+  formats.emplace_back("smesh");
+  return formats;
+}
 
 void AddMeshOutput(CLI::App& command, std::string& path, std::string& format, bool& no_boundary) {
   command.add_option("-o,--out", path, "File of the mesh, or - for standard output")->required()->type_name("FILE");
@@ -49,16 +57,18 @@ void AddNoAttributes(CLI::App& command, bool& no_attributes) {
 }
 
 void MeshingOptions::AddTo(CLI::App& command) {
-  command.add_option("IN", input_, "File of points or of a domain, or - for standard input")
+  command.add_option("IN", input_, "File of points, of a domain or of a surface, or - for standard input")
       ->required()
       ->type_name("FILE");
+  surface_.AddMoreTo(command, "IN");
   parameters_.AddSpaceTo(command);
   parameters_.AddQualityTo(command);
   remote_.AddTo(command, RemoteCommand::Needs::kAnyServer);
   command.add_option("--stats", statistics_, "Write figures as JSON to this file, or - for standard output")
       ->type_name("FILE");
-  AddCloudOptions(command, cloud_options_, "IN", formats::DomainOnlyFormats());
+  AddCloudOptions(command, cloud_options_, "IN", InputFormats());
   domain_.AddTo(command);
+  surface_.AddMeshingTo(command, "IN");
   size_field_.AddTo(command);
 }
 
@@ -68,6 +78,7 @@ absl::Status MeshingOptions::Check() const { return parameters_.Check(); }
 
 void MeshingOptions::AddFilesTo(formats::FilePlan& files) const {
   files.Reads("IN", input_);
+  surface_.AddFilesTo(files);
   size_field_.AddFilesTo(files);
   remote_.AddFilesTo(files);
   files.Writes("--stats", statistics_);
@@ -77,6 +88,16 @@ void MeshingOptions::AddFilesTo(formats::FilePlan& files) const {
 }
 
 absl::StatusOr<formats::PointCloud> MeshingOptions::Read() {
+  const bool is_surface = surface_.IsSurface(input_, cloud_options_, SurfaceOptions::Poly::kByPath);
+  if (is_surface) {
+    WELLSPACE_RETURN_IF_ERROR(domain_.CheckOther("IN has triangles, which bound solids; give a file of segments"));
+    return surface_.ReadInput(input_, cloud_options_);
+  }
+  WELLSPACE_RETURN_IF_ERROR(surface_.CheckOther("IN"));
+  if (const char* const option = parameters_.GivenOfSurface(); option != nullptr) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        option, ": IN has no triangles; give a .stl, .smesh or 3-D .poly, or --triangles with .obj, .ply or .off"));
+  }
   if (domain_.IsDomain(input_, cloud_options_.format)) {
     return domain_.Read(input_, cloud_options_);
   }
@@ -88,6 +109,7 @@ absl::StatusOr<formats::PointCloud> MeshingOptions::Read() {
 absl::StatusOr<client::MeshOptions> MeshingOptions::OptionsFor(const formats::PointCloud& cloud) {
   WELLSPACE_ASSIGN_OR_RETURN(client::MeshOptions options, parameters_.For(cloud.dimension, cloud.points));
   options.features = domain_.features();
+  options.surface = surface_.features();
   WELLSPACE_ASSIGN_OR_RETURN(options.size_samples,
                              size_field_.Read(cloud.dimension, cloud_options_.skip_invalid, options.gradation));
   if (!options.threads.has_value()) {
@@ -114,8 +136,14 @@ int MeshingOptions::Run(const Work& work) {
     if (!absl::IsInvalidArgument(status) || explained != status) {
       return explained;
     }
-    return domain_.features() != nullptr ? domain_.WithOrigins(status) : WithOrigins(status, *cloud);
+    return WithPlacesInFile(status, *cloud);
   });
+}
+
+absl::Status MeshingOptions::WithPlacesInFile(const absl::Status& status, const formats::PointCloud& cloud) const {
+  return domain_.features() != nullptr    ? domain_.WithOrigins(status)
+         : surface_.features() != nullptr ? surface_.WithOrigins(status)
+                                          : WithOrigins(status, cloud);
 }
 
 absl::Status MeshingOptions::WriteStatistics(const std::string& statistics,

@@ -17,7 +17,7 @@ namespace wellspace::cli {
 
 // A finite number, correctly rounded (CLI11 rounds twice).
 CLI::Option* AddNumber(CLI::App& command, const std::string& name, double& value, const std::string& description);
-// The same, or "none": as if the option were not given, which takes back what a session has.
+// The same, or "none": as if the option were not given, which takes back the value of a session.
 CLI::Option* AddNumber(CLI::App& command, const std::string& name, std::optional<double>& value,
                        const std::string& description);
 

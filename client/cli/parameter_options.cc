@@ -4,10 +4,12 @@
 #include <charconv>
 #include <cmath>
 #include <numbers>
+#include <tuple>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "client/cli/json.h"
 #include "client/cli/length.h"
 #include "client/cli/options.h"
 #include "client/cli/size_field_options.h"
@@ -18,8 +20,14 @@
 namespace wellspace::cli {
 namespace {
 
-constexpr char kRadiusEdge[] = "radius-edge";
-constexpr char kWellSpaced[] = "well-spaced";
+constexpr client::Criterion kRadiusEdge = client::Criterion::kRadiusEdge;
+constexpr client::Criterion kWellSpaced = client::Criterion::kWellSpaced;
+constexpr char kTolerance[] = "--tolerance";
+constexpr char kFacetLength[] = "--facet-length";
+constexpr char kMinFacetAngle[] = "--min-facet-angle";
+constexpr char kMinSize[] = "--min-size";
+constexpr char kPerCircle[] = "--per-circle";
+constexpr char kLayers[] = "--layers";
 
 bool IsDimension(size_t dimension) {
   return dimension >= formats::kMinDimension && dimension <= formats::kMaxDimension;
@@ -35,12 +43,12 @@ CLI::Option* AddCriterion(CLI::App& command, client::Criterion& criterion) {
       .add_option_function<std::string>(
           "--criterion",
           [&criterion](const std::string& name) {
-            criterion = name == kWellSpaced ? client::Criterion::kWellSpaced : client::Criterion::kRadiusEdge;
+            criterion = name == CriterionName(kWellSpaced) ? kWellSpaced : kRadiusEdge;
           },
           "What --rho bounds: radius-edge, circumradius / shortest edge of every simplex; or well-spaced, for every "
           "vertex the farthest node of its Voronoi cell / its nearest neighbour, which is stronger; default: "
           "radius-edge")
-      ->check(CLI::IsMember({kRadiusEdge, kWellSpaced}));
+      ->check(CLI::IsMember({CriterionName(kRadiusEdge), CriterionName(kWellSpaced)}));
 }
 
 void AddSizes(CLI::App& command, std::optional<double>& max_circumradius,
@@ -103,6 +111,7 @@ void ParameterOptions::AddQualityTo(CLI::App& command) {
   AddNumber(command, "--min-dihedral", options_.min_dihedral,
             "3-D: move and add vertices until no dihedral angle is smaller, in degrees, up to 18; 0: leave slivers as "
             "they are; default: 12");
+  AddSurfaceTo(command);
   command.add_flag("--pump-weights", options_.pump_weights,
                    "From 3-D on: give vertices weights that make the worst simplices better; the mesh is then their "
                    "regular triangulation, not Delaunay. After --min-dihedral only if that has left slivers");
@@ -116,11 +125,53 @@ void ParameterOptions::AddQualityTo(CLI::App& command) {
   AddCount(
       command, "--threads", [this](uint64_t count) { options_.threads = static_cast<int>(count); },
       "Threads that mesh; default: as many as help, up to all cores; of a session 1", 1, 1024);
-  for (const char* name :
-       {"--criterion", "--rho", "--size", "--size-box", "--min-dihedral", "--pump-weights", "--max-vertices",
-        "--threads", "--keep-vertices", "--min-angle", "--edge-length", "--gradation"}) {
+  for (const char* name : {"--criterion", "--rho", "--size", "--size-box", "--min-dihedral", "--pump-weights",
+                           "--max-vertices", "--threads", "--keep-vertices", "--min-angle", "--edge-length",
+                           "--gradation", kTolerance, kFacetLength, kMinFacetAngle, kMinSize, kPerCircle, kLayers}) {
     quality_.push_back(command.get_option(name));
   }
+}
+
+void ParameterOptions::AddSurfaceTo(CLI::App& command) {
+  const std::string share = "; with %, a share of the diagonal of the surface's bounding box, as 0.1%";
+  AddLength(
+      command, kTolerance, tolerance_,
+      "Of a surface: it and the facets of the mesh on it are nowhere farther apart, in either direction: a length" +
+          share + "; default: 0.1%, with --solids winding --resolution",
+      Length::Whole::kDiagonal);
+  AddLength(command, kFacetLength, facet_length_,
+            "Of a surface: length that edges on it have on average, where nothing asks for shorter ones" + share +
+                "; default: none",
+            Length::Whole::kDiagonal);
+  AddNumber(command, kMinFacetAngle, options_.surface_parameters.min_facet_angle,
+            "Of a surface: no facet has a smaller angle, but where the surface itself has, in degrees, up to 30; 0: "
+            "whatever comes; default: 25");
+  AddLength(command, kMinSize, min_size_,
+            "Of a surface: nothing is added to it for its shape, or for --tolerance, nearer to another vertex than "
+            "this" +
+                share + "; default: half of --tolerance",
+            Length::Whole::kDiagonal);
+  AddNumber(command, kPerCircle, options_.surface_parameters.curvature_elements,
+            "Of a surface: where it is curved, edges are so short that this many would go round a circle of its radius "
+            "of curvature, and grow from there by --gradation; not for scans, whose noise is curvature; default: none");
+  AddNumber(command, kLayers, options_.surface_parameters.thickness_layers,
+            "Of a surface: where a solid is thin, edges are so short that this many go across it, and grow from there "
+            "by --gradation; default: none");
+}
+
+const char* ParameterOptions::GivenOfSurface() const {
+  const client::SurfaceParameters& surface = options_.surface_parameters;
+  for (const auto& [is_given, name] : {std::pair<bool, const char*>(tolerance_.has_value(), kTolerance),
+                                       {facet_length_.has_value(), kFacetLength},
+                                       {surface.min_facet_angle.has_value(), kMinFacetAngle},
+                                       {min_size_.has_value(), kMinSize},
+                                       {surface.curvature_elements.has_value(), kPerCircle},
+                                       {surface.thickness_layers.has_value(), kLayers}}) {
+    if (is_given) {
+      return name;
+    }
+  }
+  return nullptr;
 }
 
 int ParameterOptions::dimension() const {
@@ -150,12 +201,17 @@ absl::StatusOr<client::MeshOptions> ParameterOptions::For(int dimension, std::sp
   client::MeshOptions options = options_;
   options.dimension = dimension;
   options.size_boxes = std::move(boxes);
-  if (merge_.has_value()) {
-    if (merge_->is_share && points.empty()) {
+  for (const auto& [name, length, value] : {std::tuple("--merge", &merge_, &options.merge_distance),
+                                            {kTolerance, &tolerance_, &options.surface_parameters.tolerance},
+                                            {kFacetLength, &facet_length_, &options.surface_parameters.edge_length},
+                                            {kMinSize, &min_size_, &options.surface_parameters.min_size}}) {
+    if (length->has_value() && (*length)->is_share && points.empty()) {
       return absl::InvalidArgumentError(
-          "--merge: a share is one of the points, which are not known yet; give a length");
+          absl::StrCat(name, ": a share is one of the points, which are not known here; give a length"));
     }
-    options.merge_distance = merge_->Of(points, dimension);
+    if (length->has_value()) {
+      *value = (*length)->Of(points, dimension);
+    }
   }
   if (min_angle_ > 0) {
     if (dimension != 2) {
@@ -195,6 +251,12 @@ absl::StatusOr<client::MeshOptions> ParameterOptions::Replace(client::MeshOption
   replace(9, parameters.rho, given->rho);
   replace(10, parameters.edge_length, given->edge_length);
   replace(11, parameters.gradation, given->gradation);
+  replace(12, parameters.surface_parameters.tolerance, given->surface_parameters.tolerance);
+  replace(13, parameters.surface_parameters.edge_length, given->surface_parameters.edge_length);
+  replace(14, parameters.surface_parameters.min_facet_angle, given->surface_parameters.min_facet_angle);
+  replace(15, parameters.surface_parameters.min_size, given->surface_parameters.min_size);
+  replace(16, parameters.surface_parameters.curvature_elements, given->surface_parameters.curvature_elements);
+  replace(17, parameters.surface_parameters.thickness_layers, given->surface_parameters.thickness_layers);
   return parameters;
 }
 
@@ -216,6 +278,19 @@ std::string ParameterOptions::OptionOf(const std::string& field) const {
   }
   if (name == "merge_distance") {
     return "--merge";
+  }
+  for (const auto& [of_surface, option] : {std::pair<const char*, const char*>("surface.tolerance", kTolerance),
+                                           {"surface.edge_length", kFacetLength},
+                                           {"surface.min_facet_angle", kMinFacetAngle},
+                                           {"surface.min_size", kMinSize},
+                                           {"surface.curvature_elements", kPerCircle},
+                                           {"surface.thickness_layers", kLayers}}) {
+    if (name == of_surface) {
+      return option;
+    }
+  }
+  if (const char* const given = GivenOfSurface(); name == "surface" && given != nullptr) {
+    return given;
   }
   std::string option = "--" + name;
   std::replace(option.begin(), option.end(), '_', '-');

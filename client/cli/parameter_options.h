@@ -1,4 +1,4 @@
-// The options that say what a mesh is to be.
+// The options for the parameters of a mesh.
 #ifndef WELLSPACE_CLIENT_CLI_PARAMETER_OPTIONS_H_
 #define WELLSPACE_CLIENT_CLI_PARAMETER_OPTIONS_H_
 
@@ -36,11 +36,14 @@ class ParameterOptions {
   // As far as the options tell it; 0: not known.
   int dimension() const;
 
-  // What can be known to be wrong before the dimension is.
+  // The faults that can be known before the dimension is.
   absl::Status Check() const;
 
-  // What they say of a mesh of `dimension`, of `points` if they are known.
+  // Their values for a mesh of `dimension`, of `points` if they are known.
   absl::StatusOr<client::MeshOptions> For(int dimension, std::span<const double> points = {}) const;
+
+  // The first option that was given about the surface of a domain in 3-D; null if none was.
+  const char* GivenOfSurface() const;
 
   // Whether any of AddQualityTo's was given; if so, `parameters` with these in the place of its own.
   bool has_quality() const;
@@ -51,6 +54,7 @@ class ParameterOptions {
   absl::Status Explain(const absl::Status& status) const;
 
  private:
+  void AddSurfaceTo(CLI::App& command);
   std::string OptionOf(const std::string& field) const;
 
   int dimension_ = 0;
@@ -58,6 +62,9 @@ class ParameterOptions {
   std::vector<std::vector<double>> size_boxes_;
   client::MeshOptions options_;
   std::optional<Length> merge_;
+  std::optional<Length> tolerance_;
+  std::optional<Length> facet_length_;
+  std::optional<Length> min_size_;
   double min_angle_ = 0;               // degrees; 0: not given
   std::vector<CLI::Option*> quality_;  // in the order of AddQualityTo
 };

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <iostream>
 #include <optional>
 
@@ -27,7 +28,7 @@ std::string WithThousands(uint64_t number) {
 std::string ProgressLine(const std::string& phase, double fraction, const std::string& amount,
                          const std::string& left) {
   constexpr size_t kColumns = 79;
-  constexpr int kBarColumns = 24;
+  constexpr int kBarColumns = 16;
   const double part = fraction > 0 ? std::min(fraction, 1.0) : 0;  // also for NaN
   const int filled = static_cast<int>(part * kBarColumns);
   const std::string line =
@@ -42,7 +43,14 @@ ProgressBar::ProgressBar(bool wanted) : enabled_(wanted && isatty(STDERR_FILENO)
 ProgressBar::~ProgressBar() { Clear(); }
 
 void ProgressBar::Update(const client::Progress& progress) {
-  Update(progress.phase, progress.fraction, WithThousands(progress.vertices) + " vertices");
+  if (phase_ != progress.phase) {
+    phase_ = progress.phase;
+    rate_ = client::MeanRate();
+  }
+  const std::optional<double> rate = rate_.At(progress.vertices, absl::Now());
+  Update(progress.phase, progress.fraction,
+         absl::StrCat(WithThousands(progress.vertices), " vertices",
+                      rate.has_value() ? absl::StrCat(", ", WithThousands(std::llround(*rate)), "/s") : ""));
 }
 
 void ProgressBar::Update(const std::string& phase, double fraction, const std::string& amount) {
@@ -50,7 +58,7 @@ void ProgressBar::Update(const std::string& phase, double fraction, const std::s
     return;
   }
   const std::optional<absl::Duration> left = time_left_.At(fraction, absl::Now());
-  const std::string line = ProgressLine(phase, fraction, amount, left ? TimeText(*left) : "");
+  const std::string line = ProgressLine(phase, fraction, amount, left ? client::TimeText(*left) : "");
   if (line != drawn_) {
     std::cerr << "\r" << line << "\x1b[K" << std::flush;
     drawn_ = line;

@@ -1,12 +1,12 @@
-// A line on a terminal that shows how far work is, and how much longer it takes.
+// A line on a terminal that shows how far work is, how fast it is, and how much longer it takes.
 #ifndef WELLSPACE_CLIENT_CLI_PROGRESS_BAR_H_
 #define WELLSPACE_CLIENT_CLI_PROGRESS_BAR_H_
 
 #include <cstdint>
 #include <string>
 
-#include "client/cli/time_left.h"
 #include "client/client.h"
+#include "client/time_left.h"
 
 namespace wellspace::cli {
 
@@ -30,8 +30,10 @@ class ProgressBar {
 
  private:
   const bool enabled_;
-  TimeLeft time_left_;
-  std::string drawn_;  // the line on the terminal; empty: none
+  client::TimeLeft time_left_;
+  std::string phase_;      // to which the rate belongs
+  client::MeanRate rate_;  // of vertices
+  std::string drawn_;      // the line on the terminal; empty: none
 };
 
 // The line without colours and control characters, at most 79 columns wide, whatever the fraction is. `left` is the

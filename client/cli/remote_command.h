@@ -1,4 +1,4 @@
-// What every command that talks to a server has: which server, how long, and how results are printed.
+// The common part of commands that talk to a server: which server, how long, and how results are printed.
 #ifndef WELLSPACE_CLIENT_CLI_REMOTE_COMMAND_H_
 #define WELLSPACE_CLIENT_CLI_REMOTE_COMMAND_H_
 

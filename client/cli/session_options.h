@@ -1,4 +1,4 @@
-// What the commands about sessions have in common.
+// The common part of the commands about sessions.
 #ifndef WELLSPACE_CLIENT_CLI_SESSION_OPTIONS_H_
 #define WELLSPACE_CLIENT_CLI_SESSION_OPTIONS_H_
 
@@ -23,7 +23,7 @@ void AddSessions(CLI::App& command, std::vector<std::string>& sessions);
 CLI::Option* AddOperation(CLI::App& command, std::string& name);
 
 // The operation that `name` means.
-// Errors:     FAILED_PRECONDITION when the session has had none yet; those of GetSession.
+// Errors:     FAILED_PRECONDITION when the session has had none yet; as of GetSession.
 absl::StatusOr<std::string> FindOperation(client::Client& client, const std::string& name,
                                           const client::CallOptions& call);
 

@@ -37,13 +37,13 @@ class SizeFieldOptions {
   void AddFilesTo(formats::FilePlan& files) const;
 
   // Reads the file; null if there is none. With `skip_invalid` sizes that are missing or not finite are left out.
-  // `gradation`: what is asked for; none: the default.
+  // `gradation`: the requested one; none: the default.
   //
   // Errors:     those of formats::ReadSizes.
   absl::StatusOr<std::shared_ptr<const client::SizeSamples>> Read(int dimension, bool skip_invalid,
                                                                   std::optional<double> gradation);
 
-  // What was found while the file was read; how many sizes were left out.
+  // Findings while the file was read; how many sizes were left out.
   const std::vector<std::string>& notes() const { return origins_.notes; }
   uint64_t skipped() const { return origins_.skipped; }
 
@@ -57,7 +57,7 @@ class SizeFieldOptions {
   formats::PointCloud origins_;  // of the samples, without their coordinates
 };
 
-// Prints what was found while the field was read, as PrintNotes does, and adds it to `report`.
+// Prints the notes on the reading of the field, as PrintNotes does, and adds it to `report`.
 void NoteSizes(const SizeFieldOptions& field, const formats::CloudOptions& options, OutputFormat format, bool quiet,
                CloudReport& report);
 

@@ -15,7 +15,7 @@
 namespace wellspace::cli {
 
 __attribute__((no_sanitize("address", "thread", "undefined"))) void HoldStandardDescriptors() {
-  // In this order: open(2) takes the lowest number. Each is opened for what is never done with it, so that this fails.
+  // In this order: open(2) takes the lowest number. Each is opened for the use that it never has, so that this fails.
   for (int descriptor = STDIN_FILENO; descriptor <= STDERR_FILENO; ++descriptor) {
     // Not by the functions of these names: a sanitizer puts its own in their place, which are not ready yet.
     if (syscall(SYS_fcntl, descriptor, F_GETFD) < 0 && errno == EBADF &&

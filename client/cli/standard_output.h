@@ -10,7 +10,7 @@
 namespace wellspace::cli {
 
 // Occupies the numbers of standard input, output and error where the caller has closed them, so that no file gets them:
-// what is printed would go into it. Reading such an input and writing such an output still fail. To be called before
+// printed text would go into it. Reading such an input and writing such an output still fail. To be called before
 // anything is opened, also before the constructors of libraries: it uses nothing that wants to be initialised.
 void HoldStandardDescriptors();
 
@@ -25,7 +25,7 @@ class StandardOutput final : public std::streambuf {
   StandardOutput(const StandardOutput&) = delete;
   StandardOutput& operator=(const StandardOutput&) = delete;
 
-  // Writes what is buffered. Returns the first error of all writes so far, RESOURCE_EXHAUSTED.
+  // Writes the buffer. Returns the first error of all writes so far, RESOURCE_EXHAUSTED.
   absl::Status Flush() { return file_.Flush(); }
 
  private:

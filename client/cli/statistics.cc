@@ -1,108 +1,68 @@
 #include "client/cli/statistics.h"
 
 #include <array>
+#include <initializer_list>
 #include <nlohmann/json.hpp>
-#include <vector>
+#include <string>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
 #include "client/cli/progress_bar.h"
 #include "client/formats/mesh.h"
+#include "client/json/statistics.h"
 
 namespace wellspace::cli {
 namespace {
 
-nlohmann::ordered_json DuplicateOf(std::span<const uint32_t> input_vertex) {
-  nlohmann::ordered_json pairs = nlohmann::ordered_json::array();
-  // Points become vertices 0, 1, ... in the order in which they are first met, whether equal to the vertex or merged
-  // with it.
-  uint32_t distinct = 0;
-  for (size_t i = 0; i < input_vertex.size(); ++i) {
-    if (input_vertex[i] == distinct) {
-      ++distinct;
-    } else if (input_vertex[i] != client::kNoVertex) {
-      pairs.push_back({i, input_vertex[i]});
+// ", 12 segments, 3 crossings split": how many rows there are, and the other counts but those that are 0.
+std::string CountsText(uint64_t rows, const char* what,
+                       std::initializer_list<std::pair<uint64_t, const char*>> others) {
+  std::string text = absl::StrCat(", ", WithThousands(rows), " ", what);
+  for (const auto& [count, name] : others) {
+    if (count > 0) {
+      absl::StrAppend(&text, ", ", WithThousands(count), " ", name);
     }
   }
-  return pairs;
-}
-
-nlohmann::ordered_json DomainJson(const client::DomainStatistics& domain) {
-  return {{"unmeshed_points", domain.unmeshed_points},
-          {"segments", domain.segments},
-          {"subsegments", domain.subsegments},
-          {"dropped_segments", domain.dropped_segments},
-          {"touching_points", domain.touching_points},
-          {"crossings", domain.crossings},
-          {"near_points", domain.near_points},
-          {"exempt_simplices", domain.exempt_simplices},
-          {"min_input_angle_deg", domain.min_input_angle_deg},
-          {"unused_seeds", domain.unused_seeds}};
-}
-
-// What was changed of a domain, and what is not meshed of it.
-std::string DomainText(const client::DomainStatistics& domain) {
-  std::string text = absl::StrCat(", ", WithThousands(domain.segments), " segments");
-  const auto add = [&](uint64_t count, const char* what) {
-    if (count > 0) {
-      absl::StrAppend(&text, ", ", WithThousands(count), " ", what);
-    }
-  };
-  add(domain.crossings, "crossings split");
-  add(domain.touching_points, "points on segments");
-  add(domain.near_points, "points that segments were led through");
-  add(domain.dropped_segments, "segments dropped");
-  add(domain.unmeshed_points, "points outside");
-  add(domain.unused_seeds, "holes and regions outside");
   return text;
 }
 
-const char* AngleName(int dimension) { return dimension == 2 ? "min_angle_deg" : "min_dihedral_deg"; }
-
-const char* TriangulationName(client::Triangulation triangulation) {
-  switch (triangulation) {
-    case client::Triangulation::kDelaunay:
-      return "delaunay";
-    case client::Triangulation::kRegular:
-      return "regular";
-    default:
-      return "unknown";  // of an older server
-  }
+// The changes of a surface, and its parts that are not meshed.
+std::string SurfaceText(const client::SurfaceStatistics& surface) {
+  return CountsText(surface.triangles, "triangles",
+                    {{surface.welded_points, "points welded"},
+                     {surface.dropped_triangles, "triangles dropped"},
+                     {surface.unmeshed_points, "points outside"},
+                     {surface.unused_seeds, "holes and regions outside"}});
 }
 
-const char* ReasonName(client::SliverReason reason) {
-  switch (reason) {
-    case client::SliverReason::kDemands:
-      return "demands";
-    case client::SliverReason::kAngle:
-      return "angle";
-    case client::SliverReason::kWork:
-      return "work";
-    default:
-      return "unknown";  // of another server
+// "; facets at most 0.001 from the surface".
+std::string DeviationText(const client::SurfaceStatistics& surface) {
+  std::string text;
+  if (surface.deviation_of_facets > 0 || surface.deviation_of_surface > 0) {
+    absl::StrAppendFormat(&text, "; facets at most %.3g from the surface, and it from them at most %.3g",
+                          surface.deviation_of_facets, surface.deviation_of_surface);
   }
+  if (surface.tube_simplices > 0) {
+    absl::StrAppendFormat(&text, "; %s tetrahedra at creases below 75 degrees, the others have %.4g at least",
+                          WithThousands(surface.tube_simplices), surface.min_angle_outside_deg);
+  }
+  if (surface.lost_ridges > 0) {
+    absl::StrAppend(&text, "; ", WithThousands(surface.lost_ridges), " parts of creases are lost");
+  }
+  return text;
 }
 
-nlohmann::ordered_json SliversJson(const client::SliverStatistics& slivers) {
-  nlohmann::ordered_json json;
-  json["found"] = slivers.found;
-  json["left"] = slivers.left;
-  json["moves"] = slivers.moves;
-  json["added_vertices"] = slivers.added_vertices;
-  json["weighted_vertices"] = slivers.weighted_vertices;
-  json["min_angle_before_deg"] = slivers.min_angle_before_deg;
-  json["operations"] = slivers.operations;
-  json["left_by"] = {
-      {"demands", slivers.left_by_demands}, {"angle", slivers.left_by_angle}, {"work", slivers.left_by_work}};
-  json["flattest_left"] = nlohmann::ordered_json::array();
-  for (const client::LeftSliver& left : slivers.flattest_left) {
-    nlohmann::ordered_json& item = json["flattest_left"].emplace_back();
-    item["vertices"] = left.vertices;
-    item["min_dihedral_deg"] = left.min_dihedral_deg;
-    item["reason"] = ReasonName(left.reason);
-  }
-  return json;
+// The changes of a domain, and its parts that are not meshed.
+std::string DomainText(const client::DomainStatistics& domain) {
+  return CountsText(domain.segments, "segments",
+                    {{domain.crossings, "crossings split"},
+                     {domain.touching_points, "points on segments"},
+                     {domain.near_points, "points that segments were led through"},
+                     {domain.dropped_segments, "segments dropped"},
+                     {domain.unmeshed_points, "points outside"},
+                     {domain.unused_seeds, "holes and regions outside"}});
 }
 
 // "; Delaunay, from 0.05° by 3 moves, 1 added vertices".
@@ -122,33 +82,6 @@ std::string SliversText(const client::SliverStatistics& slivers) {
 
 }  // namespace
 
-std::string StatisticsJson(const client::MeshHeader& mesh, std::span<const uint32_t> input_vertex,
-                           std::span<const uint32_t> moved_vertices) {
-  const client::MeshStatistics& statistics = mesh.statistics;
-  nlohmann::ordered_json json;
-  json["dimension"] = mesh.dimension;
-  json["domain_low"] = mesh.domain_low;
-  json["domain_high"] = mesh.domain_high;
-  json["input_points"] = statistics.input_points;
-  json["duplicates"] = statistics.duplicates;
-  json["merged_points"] = statistics.merged_points;
-  json["vertices"] = statistics.vertices;
-  json["simplices"] = statistics.simplices;
-  json["max_radius_edge"] = statistics.max_radius_edge;
-  json[AngleName(mesh.dimension)] = statistics.min_angle_deg;
-  json["triangulation"] = TriangulationName(statistics.triangulation);
-  if (statistics.domain.has_value()) {
-    json["domain"] = DomainJson(*statistics.domain);
-  }
-  json["slivers"] = statistics.slivers.has_value() ? SliversJson(*statistics.slivers) : nlohmann::ordered_json();
-  json["seconds"] = statistics.seconds;
-  json["peak_memory_bytes"] = statistics.peak_memory_bytes;
-  json["counters"] = statistics.counters;
-  json["duplicate_of"] = DuplicateOf(input_vertex);
-  json["moved_vertices"] = std::vector<uint32_t>(moved_vertices.begin(), moved_vertices.end());
-  return json.dump(2) + "\n";
-}
-
 std::string Summary(const client::MeshHeader& mesh) {
   const client::MeshStatistics& statistics = mesh.statistics;
   const auto total = statistics.seconds.find("total");
@@ -156,10 +89,13 @@ std::string Summary(const client::MeshHeader& mesh) {
       WithThousands(statistics.input_points), " points",
       statistics.duplicates == 0 ? "" : absl::StrCat(" (", WithThousands(statistics.duplicates), " duplicates)"),
       statistics.merged_points == 0 ? "" : absl::StrCat(" (", WithThousands(statistics.merged_points), " merged)"),
-      statistics.domain.has_value() ? DomainText(*statistics.domain) : "", " -> ", WithThousands(statistics.vertices),
-      " vertices, ", WithThousands(statistics.simplices), " ", formats::SimplexName(mesh.dimension),
+      statistics.domain.has_value() ? DomainText(*statistics.domain) : "",
+      statistics.surface.has_value() ? SurfaceText(*statistics.surface) : "", " -> ",
+      WithThousands(statistics.vertices), " vertices, ", WithThousands(statistics.simplices), " ",
+      formats::SimplexName(mesh.dimension),
       absl::StrFormat("; radius-edge at most %.4f, %s at least %.2f\u00b0", statistics.max_radius_edge,
                       mesh.dimension == 2 ? "angles" : "dihedral angles", statistics.min_angle_deg),
+      statistics.surface.has_value() ? DeviationText(*statistics.surface) : "",
       statistics.slivers.has_value() ? SliversText(*statistics.slivers) : "",
       mesh.moved_vertex_count == 0
           ? ""
@@ -194,7 +130,7 @@ std::string SliverWarning(const client::MeshHeader& mesh) {
   absl::StrAppend(&text, *separator == ';' ? ")" : "");
   for (const client::LeftSliver& left : slivers.flattest_left) {
     absl::StrAppend(&text, "\n  vertices ", absl::StrJoin(left.vertices, " "),
-                    absl::StrFormat(": %.3g\u00b0, by ", left.min_dihedral_deg), ReasonName(left.reason));
+                    absl::StrFormat(": %.3g\u00b0, by ", left.min_dihedral_deg), client::ReasonName(left.reason));
   }
   return text + "\n";
 }
@@ -231,7 +167,7 @@ std::string WithBinaryUnit(uint64_t bytes) {
   }
   auto value = static_cast<double>(bytes);
   size_t unit = 0;
-  // What would be printed as 1024 goes on to the next unit.
+  // A value that would be printed as 1024 goes on to the next unit.
   while (value >= 1023.5 && unit + 1 < kUnits.size()) {
     value /= 1024;
     ++unit;

@@ -1,29 +1,13 @@
-// What is told about a finished mesh.
+// The figures of a finished mesh.
 #ifndef WELLSPACE_CLIENT_CLI_STATISTICS_H_
 #define WELLSPACE_CLIENT_CLI_STATISTICS_H_
 
 #include <cstdint>
-#include <span>
 #include <string>
 
 #include "client/client.h"
 
 namespace wellspace::cli {
-
-// One JSON object:
-//   dimension, domain_low, domain_high
-//   input_points, duplicates, vertices, simplices, max_radius_edge, min_angle_deg (2-D) or min_dihedral_deg (above)
-//   triangulation: "delaunay" or "regular"
-//   slivers:  {found, left, moves, added_vertices, weighted_vertices, min_angle_before_deg, operations,
-//             left_by: {demands, angle, work}, flattest_left: [{vertices, min_dihedral_deg, reason}, ...]}, null if
-//             nothing was asked for
-//   seconds:  {tree, refinement, simplices, ..., total}, without reading and writing files
-//   peak_memory_bytes, counters
-//   duplicate_of: [[i, v], ...]: input point i is equal to an earlier one, and both became vertex v. The other input
-//                 points are, in their order, the first vertices. `input_vertex` says which vertex each became.
-//   moved_vertices: the vertices that the session's mesh before had at another place
-std::string StatisticsJson(const client::MeshHeader& mesh, std::span<const uint32_t> input_vertex,
-                           std::span<const uint32_t> moved_vertices = {});
 
 // "5 points -> 17 vertices, 20 triangles; ...", one line without its end.
 std::string Summary(const client::MeshHeader& mesh);

@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_replace.h"
+#include "client/cli/labelled_lines.h"
 #include "client/cli/progress_bar.h"
 
 namespace wellspace::cli {
@@ -66,21 +67,9 @@ Json FaultsJson(const formats::Surface& surface, const core::SurfaceReport& repo
   return faults;
 }
 
-void PrintLine(const std::string& label, const std::string& text) {
-  std::cout << absl::StrFormat("%-20s %s\n", label, text);
-}
-
 // "2 points", "1 point".
 std::string Counted(uint64_t count, const std::string& what) {
   return absl::StrCat(WithThousands(count), " ", what, count == 1 ? "" : "s");
-}
-
-std::string Numbers(const Json& numbers) {
-  std::string text;
-  for (const Json& number : numbers) {
-    absl::StrAppend(&text, text.empty() ? "" : ", ", absl::StrFormat("%.9g", number.get<double>()));
-  }
-  return text;
 }
 
 std::string Patches(uint64_t count) { return absl::StrCat(WithThousands(count), count == 1 ? " patch" : " patches"); }
@@ -149,6 +138,7 @@ void PrintFault(const Json& fault) {
   // By which options the tool accepts that.
   const std::string accepted = absl::StrReplaceAll(
       fault["accepted"].get<std::string>(), {{"solids by holes", "solids by holes (--solids holes)"},
+                                             {"solids by winding", "solids by winding (--solids winding)"},
                                              {"weld with a longer distance", "weld with a longer distance (--weld)"}});
   PrintLine("", absl::StrCat("  expected ", accepted));
 }

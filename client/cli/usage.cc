@@ -4,16 +4,16 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
-#include "client/cli/closest_word.h"
 #include "client/cli/command_tree.h"
 #include "client/cli/domain_options.h"
 #include "client/cli/length.h"
 #include "client/cli/standard_output.h"
+#include "core/base/closest_word.h"
 
 namespace wellspace::cli {
 namespace {
 
-// Of what could not be parsed: there is no format to ask for.
+// Of a command line that could not be parsed: there is no format to ask for.
 OutputFormat FormatAskedFor(const std::vector<std::string>& arguments) {
   for (size_t i = 0; i < arguments.size(); ++i) {
     if (arguments[i] == "--output=json" ||
@@ -53,12 +53,12 @@ std::string MeantOption(const CLI::App& command, const std::string& word) {
     names.insert(names.end(), more.begin(), more.end());
   }
   const std::string name = word.substr(0, word.find('='));
-  return name.size() > 2 ? ClosestWord(name, names) : std::string();  // any two letters are near each other
+  return name.size() > 2 ? core::ClosestWord(name, names) : std::string();  // any two letters are near each other
 }
 
 // The command among `below` that `word` may stand for, or one of another place that has this name.
 std::string MeantCommand(const CLI::App& app, const std::vector<std::string>& below, const std::string& word) {
-  std::string meant = ClosestWord(word, below);
+  std::string meant = core::ClosestWord(word, below);
   for (const Command& command : TreeOf(app)) {
     if (meant.empty() && command.name.ends_with(" " + word)) {
       meant = command.name;
@@ -101,7 +101,7 @@ absl::Status UsageError(const CLI::App& app, const CLI::ParseError& error, const
 
 int RunCommandLine(CLI::App& app, std::vector<std::string> arguments, const int& exit_code) {
   for (size_t i = 0; i < arguments.size(); ++i) {
-    const bool has_value = i + 1 < arguments.size() && Length::Parse(arguments[i + 1]).ok();
+    const bool has_value = i + 1 < arguments.size() && IsLengthOrNone(arguments[i + 1]);
     if (arguments[i] == kSnapOption && !has_value) {
       arguments[i] = absl::StrCat(kSnapOption, "=0");
     }
@@ -116,7 +116,7 @@ int RunCommandLine(CLI::App& app, std::vector<std::string> arguments, const int&
     }
     app.exit(error);  // --help, --version
   }
-  // What `check` found is lost, too. Other failures were told on standard error.
+  // The findings of `check` are lost, too. Other failures were told on standard error.
   const absl::Status written = output.Flush();
   return written.ok() || exit_code > kExitFailed ? exit_code : ReportError(written, FormatAskedFor(arguments));
 }

@@ -27,7 +27,7 @@ class CloudFile : public PointSource {
   // Number of points.
   virtual uint64_t size() const = 0;
 
-  // What is worth knowing of how the file was read, and how many points were left out; see formats::PointCloud.
+  // Notes on how the file was read, and how many points were left out; see formats::PointCloud.
   virtual const std::vector<std::string>& notes() const = 0;
   virtual uint64_t skipped() const = 0;
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::client {
@@ -10,8 +11,11 @@ namespace {
 
 constexpr size_t kValuesAtOnce = 1 << 14;
 
-// How many vertices, the first of a mesh, are input points.
+// How many vertices, the first of a mesh, are input points. Of a surface few are, and how many is not told.
 uint64_t InputVerticesOf(const MeshStatistics& statistics) {
+  if (statistics.surface.has_value()) {
+    return 0;
+  }
   const uint64_t unmeshed = statistics.domain.has_value() ? statistics.domain->unmeshed_points : 0;
   return statistics.input_points - statistics.duplicates - statistics.merged_points - unmeshed;
 }
@@ -20,6 +24,13 @@ uint64_t InputVerticesOf(const MeshStatistics& statistics) {
 
 absl::Status MeshFile::Begin(const MeshHeader& header) {
   header_ = header;
+  for (BoundaryPart& part : header_.boundary) {
+    const auto named = part_names_.find(part.tag);
+    // Parts without a marker have the tags that no marker has.
+    if (named != part_names_.end() && part.name == absl::StrCat("marker_", part.tag)) {
+      part.name = named->second;
+    }
+  }
   formats::MeshShape shape = {
       .dimension = header.dimension,
       .vertex_count = header.vertex_count,
@@ -32,8 +43,9 @@ absl::Status MeshFile::Begin(const MeshHeader& header) {
       .regions = {},
       .low = header.domain_low,
       .high = header.domain_high,
+      .ridge_count = header.ridge_count,
   };
-  for (const BoundaryPart& part : header.boundary) {
+  for (const BoundaryPart& part : header_.boundary) {
     shape.boundary.push_back({part.tag, part.name, part.facet_count});
   }
   if (header.has_vertex_marks && formats::HasPlaceForAttributes(path_, format_)) {

@@ -3,6 +3,7 @@
 #define WELLSPACE_CLIENT_FILES_MESH_FILE_H_
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <span>
 #include <stop_token>
@@ -18,7 +19,7 @@ namespace wellspace::client {
 
 // Writes a mesh to a file, in the memory of formats::MeshWriter. The file appears complete or not at all.
 //
-// Errors:     those of formats::CreateMesh and formats::MeshWriter.
+// Errors:     as of formats::CreateMesh and formats::MeshWriter.
 // Thread safety: thread-compatible.
 class MeshFile final : public MeshSink {
  public:
@@ -43,6 +44,7 @@ class MeshFile final : public MeshSink {
   absl::Status AddSimplices(std::span<const uint32_t> simplices) override { return writer_->AddSimplices(simplices); }
   absl::Status AddInputVertices(std::span<const uint32_t> vertices) override;
   absl::Status AddFacets(std::span<const uint32_t> facets) override { return writer_->AddFacets(facets); }
+  absl::Status AddRidges(std::span<const uint32_t> ridges) override { return writer_->AddRidges(ridges); }
   absl::Status Finish() override { return writer_->Commit(); }
 
   // The file gets neither boundary nor regions nor origins of vertices. To be called before Begin.
@@ -51,14 +53,18 @@ class MeshFile final : public MeshSink {
   // No format holds which vertex each input point became: this keeps it in memory. To be called before Begin.
   void KeepInputVertices() { keeps_input_vertices_ = true; }
 
-  // Gives vertices what their input points have: `attributes` of all points that were sent, NaN for others. That takes
+  // Gives vertices those of their input points: `attributes` of all points that were sent, NaN for others. That takes
   // the origins of vertices: a file that leaves out the boundary has none. To be called before Begin.
   //
   // Memory:     4 bytes a vertex, if there are attributes and the format has a place for them.
   // REQUIRES:   `attributes` outlive this.
   void AddAttributes(std::span<const formats::PointAttribute> attributes) { attributes_ = attributes; }
 
-  // What has been told of the mesh, and what was kept.
+  // Gives parts of the boundary that have these tags, of markers, these names in the place of the server's. To be
+  // called before Begin.
+  void NameParts(std::map<int32_t, std::string> names) { part_names_ = std::move(names); }
+
+  // The header of the mesh, and the arrays that were kept.
   const MeshHeader& header() const { return header_; }
   const std::vector<uint32_t>& input_vertex() const { return input_vertex_; }
   const std::vector<uint32_t>& moved_vertices() const { return moved_vertices_; }
@@ -75,6 +81,7 @@ class MeshFile final : public MeshSink {
   MeshHeader header_;
   std::unique_ptr<formats::MeshWriter> writer_;
   bool has_boundary_ = true;
+  std::map<int32_t, std::string> part_names_;
   std::span<const formats::PointAttribute> attributes_;
   std::vector<uint32_t> origins_;  // of vertices, if the file gets attributes
   bool has_attributes_ = false;    // the file

@@ -17,7 +17,7 @@ struct PointAttribute {
 };
 
 // Names of attributes as files of meshes have them: no two are the same, none is that of other data of a mesh, and none
-// has what the syntax of a format may have; "_" takes its place.
+// has characters that the syntax of a format may use; "_" takes their place.
 std::vector<std::string> NamesToWrite(std::span<const PointAttribute> attributes);
 
 }  // namespace wellspace::formats

@@ -13,7 +13,7 @@
 
 namespace wellspace::formats {
 
-// Which part each facet of a mesh is of, as they come one after the other.
+// The part of each facet of a mesh, as facets come one after the other.
 //
 // Thread safety: thread-compatible.
 class PartWalk {
@@ -53,8 +53,8 @@ class FacetSorter {
   }
   void Name(int32_t tag, std::string name) { names_[tag] = std::move(name); }
 
-  // Sets facets and parts of `mesh`: those of ascending tags, and of one tag in the order in which they came. Tags with
-  // a name and no facets are parts too.
+  // Sets facets and parts of `mesh`: facets by ascending tags, and of one tag in the order in which they came. Tags
+  // with a name and no facets are parts too.
   void MoveTo(Mesh& mesh) {
     for (const auto& [tag, name] : names_) {
       by_tag_[tag];

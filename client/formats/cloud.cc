@@ -1,7 +1,9 @@
 #include "client/formats/cloud.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <iterator>
+#include <limits>
 
 #include "absl/strings/str_cat.h"
 
@@ -27,6 +29,20 @@ std::string PointCloud::Origin(uint64_t point) const {
     return absl::StrCat(name, ":", lines.LineOf(point));
   }
   return absl::StrCat(name, "[", rows.size() > 0 ? rows.LineOf(point) : point, "]");
+}
+
+std::vector<double> BoxSides(std::span<const double> points, int dimension) {
+  std::vector<double> sides;
+  for (int axis = 0; axis < dimension; ++axis) {
+    double low = std::numeric_limits<double>::infinity();
+    double high = -std::numeric_limits<double>::infinity();
+    for (size_t i = axis; i < points.size(); i += dimension) {
+      low = std::min(low, points[i]);
+      high = std::max(high, points[i]);
+    }
+    sides.push_back(std::max(0.0, high - low));
+  }
+  return sides;
 }
 
 }  // namespace wellspace::formats

@@ -3,6 +3,7 @@
 #define WELLSPACE_CLIENT_FORMATS_CLOUD_H_
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -45,7 +46,7 @@ struct PointCloud {
   LineIndex rows;              // of every point in a file without lines, if points were skipped; or of none
   std::vector<PointAttribute> attributes{};  // if they were asked for, with as many values as there are points
   uint64_t skipped = 0;                      // points left out since a coordinate is missing or not finite
-  // What a user would want to know of how the file was read, a sentence each: which columns were taken, what was not
+  // Notes for the user on how the file was read, a sentence each: the columns taken, the parts of the file not
   // used.
   std::vector<std::string> notes;
 
@@ -54,6 +55,11 @@ struct PointCloud {
   // REQUIRES: point < size().
   std::string Origin(uint64_t point) const;
 };
+
+// The sides of the box of points, `dimension` of them: 0 without points.
+//
+// Complexity: O(n) for n coordinates.
+std::vector<double> BoxSides(std::span<const double> points, int dimension);
 
 }  // namespace wellspace::formats
 

@@ -1,5 +1,5 @@
 // The readers behind ReadCloud, one for each format. Each fills `cloud.dimension`, `points`, `skipped` and `notes`,
-// those of text `lines`, too; `options.dimension` is what the file must have, or 0. REQUIRES: cloud.name is set.
+// those of text `lines`, too; `options.dimension` is the one it must have, or 0. REQUIRES: cloud.name is set.
 // Private to this folder.
 #ifndef WELLSPACE_CLIENT_FORMATS_CLOUD_READERS_H_
 #define WELLSPACE_CLIENT_FORMATS_CLOUD_READERS_H_
@@ -39,13 +39,13 @@ absl::Status ReadAdcircPoints(LineReader& reader, const CloudOptions& options, P
 absl::Status Read2dmPoints(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
 absl::Status ReadNpzPoints(InputFile& file, const CloudOptions& options, PointCloud& cloud);
 
-// These leave options.columns to TakeColumns, which is called with what they return when no dimension was asked for.
+// These leave options.columns to TakeColumns, which is called with their result when no dimension was asked for.
 absl::Status ReadNode(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
 absl::Status ReadObj(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
 absl::Status ReadOff(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
 absl::Status TakeColumns(const CloudOptions& options, PointCloud& cloud);
 
-// What a .node has beside its points.
+// The columns of a .node beside its points.
 struct NodeNumbers {
   uint64_t index_base = 0;        // the index of the first point, 0 or 1
   std::vector<double> weights{};  // of the points, if the file has them
@@ -62,7 +62,7 @@ absl::Status ReadNode(LineReader& reader, const CloudOptions& options, PointClou
 // Errors:     a message without a location.
 absl::Status TakeCoordinate(std::string_view text, bool skip_invalid, double& value, bool& is_invalid);
 
-// What becomes of a value that is missing or not finite.
+// The treatment of a value that is missing or not finite.
 enum class InvalidValue : uint8_t {
   kRefuse,
   kTell,  // an error whose message says that it could be skipped
@@ -75,8 +75,8 @@ absl::Status TakeCoordinate(std::string_view text, InvalidValue rule, double& va
 // Adds `point`, read from the last line of `reader`, to the cloud; or counts it as skipped.
 void AddPoint(std::span<const double> point, bool is_invalid, uint64_t line, PointCloud& cloud);
 
-// What to say when a file has other coordinates than the options ask for: "expected 2 coordinates, got 3; --columns 1,2
-// takes two".
+// The message where a file has other coordinates than the options ask for: "expected 2 coordinates, got 3; --columns
+// 1,2 takes two".
 std::string DimensionError(int wanted, uint64_t count);
 
 // Notes that a file has faces, or cells that are not vertices.

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
+#include <limits>
 #include <string>
 
 #include "absl/strings/ascii.h"
@@ -18,7 +20,7 @@ constexpr size_t kMaxNameBytes = 200;
 
 bool IsDigit(char c) { return absl::ascii_isdigit(static_cast<unsigned char>(c)); }
 
-// Code points from UTF-8; 0xFFFD for what is none.
+// Code points from UTF-8; 0xFFFD for bytes that are none.
 class CodePoints {
  public:
   explicit CodePoints(std::string_view text) : rest_(text) {}
@@ -102,7 +104,7 @@ std::string HintOfCommas(std::string_view text) {
                     : " (a decimal comma? expected a point)";
 }
 
-// What `text`, which is no number, might be; empty when there is nothing to say.
+// A guess at `text`, which is no number; empty when there is nothing to say.
 std::string Hint(std::string_view text) {
   const bool has_digit = std::any_of(text.begin(), text.end(), IsDigit);
   if (!text.empty() && text.find_first_not_of('*') == std::string_view::npos) {
@@ -184,6 +186,12 @@ CoordinateKind ReadCoordinate(std::string_view text, double& value) {
   return ParseFinite(decimal, value).ok() ? CoordinateKind::kFinite : CoordinateKind::kInvalid;
 }
 
+bool ReadOrNan(std::string_view text, double& value) {
+  const CoordinateKind kind = ReadCoordinate(text, value);
+  value = kind == CoordinateKind::kInvalid ? std::numeric_limits<double>::quiet_NaN() : value;
+  return kind != CoordinateKind::kNone;
+}
+
 absl::Status CoordinateError(std::string_view text) {
   double value = 0;
   const bool is_invalid = ReadCoordinate(text, value) == CoordinateKind::kInvalid;
@@ -201,6 +209,11 @@ absl::Status TakeFinite(std::string_view text, double& value) {
       break;
   }
   return CoordinateError(text);
+}
+
+absl::Status TakeCoordinate(std::string_view text, bool may_be_invalid, double& value) {
+  const bool is_read = !text.empty() && ReadOrNan(text, value) && (may_be_invalid || !std::isnan(value));
+  return is_read ? absl::OkStatus() : CoordinateError(text);
 }
 
 bool IsColumnName(std::string_view text) {

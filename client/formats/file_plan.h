@@ -1,4 +1,4 @@
-// Which files a command is going to read and to write.
+// The files that a command is going to read and to write.
 #ifndef WELLSPACE_CLIENT_FORMATS_FILE_PLAN_H_
 #define WELLSPACE_CLIENT_FORMATS_FILE_PLAN_H_
 
@@ -9,7 +9,7 @@
 
 namespace wellspace::formats {
 
-// Tells before any work whether a command would overwrite what it reads, or write one file twice. Files are the same if
+// Tells before any work whether a command would overwrite its input, or write one file twice. Files are the same if
 // device and inode are, whatever links lead there; files that are not there yet, if folder and name are. Only regular
 // files count: pipes, terminals and other devices may be used more than once.
 //

@@ -20,7 +20,7 @@ class Labels {
   // The label of `name` or, where that is empty, of `kind` and `number`: "boundary_7".
   std::string Take(std::string_view name, std::string_view kind, int32_t number);
 
-  // What to tell of the names whose labels are not they themselves; empty if there are none.
+  // A note on the names whose labels are not they themselves; empty if there are none.
   std::string ChangesNote() const;
 
  private:

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "client/formats/attributes.h"
+#include "client/formats/mesh_part.h"
 
 namespace wellspace::formats {
 
@@ -53,7 +54,7 @@ inline uint64_t CountFacets(std::span<const BoundaryPart> parts) {
   return count;
 }
 
-// How large the arrays of a mesh are.
+// The sizes of the arrays of a mesh.
 struct MeshShape {
   int dimension = 0;
   uint64_t vertex_count = 0;
@@ -66,7 +67,9 @@ struct MeshShape {
   std::vector<Region> regions{};         // empty: nothing is told of regions
   std::vector<double> low{};             // of the mesh's box; may be missing where there is no boundary
   std::vector<double> high{};
+  uint64_t ridge_count = 0;               // edges along the creases of a surface
   std::vector<std::string> attributes{};  // of vertices: names as of NamesToWrite
+  const PartNumbers* part = nullptr;      // of a part of a larger mesh; outlives the writer; null: it is whole
 
   uint64_t facet_count() const { return CountFacets(boundary); }
 };
@@ -83,9 +86,11 @@ struct MeshView {
   std::span<const int32_t> vertex_tags{};      // vertex_count; 0: inside
   std::span<const uint32_t> facets{};          // facet_count x dimension, part after part
   std::span<const BoundaryPart> boundary{};
+  std::span<const uint32_t> ridges{};          // ridge_count x 2: edges of facets along creases, in 3-D; or none
   std::span<const int32_t> simplex_regions{};  // simplex_count ids; empty: all are of the only region
   std::span<const Region> regions{};
   std::span<const PointAttribute> attributes{};  // of vertices
+  const PartNumbers* part = nullptr;             // see MeshShape
 
   uint64_t vertex_count() const { return dimension == 0 ? 0 : points.size() / dimension; }
   uint64_t simplex_count() const { return dimension == 0 ? 0 : simplices.size() / (dimension + 1); }
@@ -99,7 +104,9 @@ struct MeshView {
                     .boundary = {boundary.begin(), boundary.end()},
                     .has_simplex_regions = !simplex_regions.empty(),
                     .regions = {regions.begin(), regions.end()},
-                    .attributes = NamesToWrite(attributes)};
+                    .ridge_count = ridges.size() / 2,
+                    .attributes = NamesToWrite(attributes),
+                    .part = part};
     for (size_t i = 0; i < points.size() && !boundary.empty(); ++i) {
       const size_t axis = i % dimension;
       if (i < static_cast<size_t>(dimension)) {
@@ -123,9 +130,10 @@ struct Mesh {
   std::vector<int32_t> vertex_tags{};
   std::vector<uint32_t> facets{};
   std::vector<BoundaryPart> boundary{};
+  std::vector<uint32_t> ridges{};
   std::vector<int32_t> simplex_regions{};
   std::vector<Region> regions{};
-  std::vector<std::string> notes{};  // what of its file was left out, a sentence each
+  std::vector<std::string> notes{};  // parts of its file that were left out, a sentence each
 
   MeshView View() const {
     return {.dimension = dimension,
@@ -136,6 +144,7 @@ struct Mesh {
             .vertex_tags = vertex_tags,
             .facets = facets,
             .boundary = boundary,
+            .ridges = ridges,
             .simplex_regions = simplex_regions,
             .regions = regions};
   }

@@ -13,15 +13,15 @@
 namespace wellspace::formats {
 namespace {
 
-// Whether ReadCloud tells what points of a mesh have beside coordinates.
+// Whether ReadCloud tells the attributes of points of a mesh.
 bool HasPointData(const std::string& format) {
   return format == "vtu" || format == "vtk" || format == "vtp" || format == "adcirc" || format == "2dm";
 }
 
 bool IsVtkFormat(const std::string& format) { return format == "vtu" || format == "vtk" || format == "vtp"; }
 
-// Takes the data of points of a file of such a format: what the mesher has written there tells input points and
-// origins, the rest are attributes. A file without is a mesh all the same.
+// Takes the data of points of a file of such a format: columns of the mesher's own tell input points and
+// origins, the rest are attributes. A file without data is a mesh all the same.
 void TakePointData(const std::string& path, MeshOrCloud& read) {
   absl::StatusOr<PointCloud> cloud = ReadCloud(path, {.format = read.format, .keep_attributes = true});
   if (!cloud.ok() || cloud->size() != read.mesh.View().vertex_count()) {

@@ -29,8 +29,8 @@ struct MeshOrCloud {
   }
 };
 
-// Reads `path` as ReadMesh does if it is a mesh, otherwise as ReadCloud. What may be either (.vtu, .vtk, .vtp) is a
-// mesh if it can be read as one, otherwise a note says why it is not; .node is one if its .ele is there. With
+// Reads `path` as ReadMesh does if it is a mesh, otherwise as ReadCloud. A file that may be either (.vtu, .vtk, .vtp)
+// is a mesh if it can be read as one, otherwise a note says why it is not; .node is one if its .ele is there. With
 // CloudOptions::format, --columns and the like it is a cloud. Data of points of VTK's formats are attributes.
 //
 // Errors:     of both.

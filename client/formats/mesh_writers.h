@@ -58,6 +58,7 @@ struct RowCounts {
   uint64_t simplices = 0;
   uint64_t facets = 0;
   uint64_t attribute_values = 0;
+  uint64_t ridges = 0;
 };
 
 // INTERNAL unless as many rows have come as `shape` says.

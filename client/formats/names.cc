@@ -20,7 +20,7 @@ bool IsHexDigit(char c) { return absl::ascii_isxdigit(static_cast<unsigned char>
 
 bool IsCharacter(char32_t letter) { return letter <= 0x10ffff && (letter < 0xd800 || letter > 0xdfff); }
 
-// What may stand in a line as it is.
+// The characters that may stand in a line as they are.
 bool IsPlainInLine(char c) { return static_cast<unsigned char>(c) >= ' ' && c != '\x7f'; }
 
 }  // namespace

@@ -37,14 +37,14 @@ class NameChanges {
 // The first `limit` bytes of `name` at most, without half a character of UTF-8.
 std::string_view CutName(std::string_view name, size_t limit);
 
-// `text` from UTF-8, and to it; what is no character becomes a question mark.
+// `text` from UTF-8, and to it; a byte of no character becomes a question mark.
 std::u32string ToUtf32(std::string_view text);
 std::string ToUtf8(std::u32string_view text);
 
 // Lines "part 7: deep sea" and "region 2: land", one for each name of a mesh: comments, or text of a file of VTK.
 // Points in the plane without simplices have the line "dimension 2", since a third coordinate is added to them.
 //
-// No line has more than kMaxNameLineBytes: MMG and Triangle take what is behind 255 or 1023 bytes of a comment for
+// No line has more than kMaxNameLineBytes: MMG and Triangle take the text behind 255 or 1023 bytes of a comment for
 // data.
 class NameLines {
  public:
@@ -54,7 +54,7 @@ class NameLines {
   const std::vector<std::string>& lines() const { return lines_; }
   // All of them, each between `before` and an end of line.
   std::string Text(std::string_view before) const;
-  // What to tell of names that were cut; empty if none was.
+  // A note on names that were cut; empty if none was.
   std::string ChangesNote() const;
 
  private:

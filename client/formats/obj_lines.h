@@ -23,7 +23,7 @@ class ObjLines {
   // The next line that is not blank, valid until the next call, and where it starts. False at the end of the file and
   // on an error, which status() tells apart.
   bool Next(std::string_view& line, uint64_t& number);
-  // As Next, but the first field of the line, a word such as "v" or "f", comes apart, and `fields` gives what follows.
+  // As Next, but the first field of the line, a word such as "v" or "f", comes apart, and `fields` gives the others.
   bool NextWord(std::string_view& word, FieldSplitter& fields, uint64_t& number);
 
   const absl::Status& status() const { return status_; }

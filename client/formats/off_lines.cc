@@ -7,7 +7,6 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/formats/io/number.h"
-#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {

@@ -121,14 +121,19 @@ absl::Status AddAllRows(const std::vector<std::string>& names, std::span<const s
   return absl::OkStatus();
 }
 
+std::vector<std::vector<double>> ColumnsOf(std::span<const double> numbers, size_t width) {
+  std::vector<std::vector<double>> columns(width);
+  for (size_t i = 0; i < numbers.size(); ++i) {
+    columns[i % width].push_back(numbers[i]);
+  }
+  return columns;
+}
+
 absl::Status AddAllPoints(std::span<const double> points, size_t width, const CloudOptions& options,
                           PointCloud& cloud) {
-  std::vector<std::vector<double>> columns(width);
-  for (size_t i = 0; i < points.size(); ++i) {
-    columns[i % width].push_back(points[i]);
-  }
   const std::vector<std::string> names = {"x", "y", "z"};
-  return AddAllRows({names.begin(), names.begin() + static_cast<ptrdiff_t>(width)}, columns, options, cloud);
+  return AddAllRows({names.begin(), names.begin() + static_cast<ptrdiff_t>(width)}, ColumnsOf(points, width), options,
+                    cloud);
 }
 
 }  // namespace wellspace::formats

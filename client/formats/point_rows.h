@@ -43,7 +43,7 @@ class PointRows {
 // The names of `components` numbers with a name in common: "NAME", or "NAME:0", "NAME:1" and so on.
 std::vector<std::string> ComponentNames(const std::string& name, uint64_t components);
 
-// The same of what is no coordinate, whatever its name: "x:0" for "x".
+// The same of columns that are no coordinates, whatever their names: "x:0" for "x".
 std::vector<std::string> DataNames(const std::string& name, uint64_t components);
 
 // Adds points that are all there: `columns` are their numbers, as many of each of `names`. Messages and origins count
@@ -51,7 +51,10 @@ std::vector<std::string> DataNames(const std::string& name, uint64_t components)
 absl::Status AddAllRows(const std::vector<std::string>& names, std::span<const std::vector<double>> columns,
                         const CloudOptions& options, PointCloud& cloud);
 
-// The same of points x 2 or x 3, row-major, that have nothing but coordinates.
+// Columns of `numbers`, n x width, row-major.
+std::vector<std::vector<double>> ColumnsOf(std::span<const double> numbers, size_t width);
+
+// AddAllRows of points x 2 or x 3, row-major, that have nothing but coordinates.
 absl::Status AddAllPoints(std::span<const double> points, size_t width, const CloudOptions& options, PointCloud& cloud);
 
 }  // namespace wellspace::formats

@@ -20,8 +20,8 @@
 //         element "vertex", of any scalar type. Other properties and the elements before it are skipped, lists too.
 //   obj   Wavefront's: two or three coordinates in each line "v"; what follows them (a weight, a colour) is skipped, as
 //         are all other lines. A line that ends in a backslash goes on in the next one.
-//   off   Geomview's in ascii: "OFF", the numbers of vertices, faces and edges, then a line for each vertex. What is
-//         before OFF announces numbers after the coordinates, which are skipped: ST texture, C colour, N normal. 4OFF
+//   off   Geomview's in ascii: "OFF", the numbers of vertices, faces and edges, then a line for each vertex. Letters
+//         before OFF announce numbers after the coordinates, which are skipped: ST texture, C colour, N normal. 4OFF
 //         has four coordinates, all taken as they are; nOFF says how many before the counts. Lower case will do, but
 //         for N and n.
 //   stl   In ascii, in any case, or binary: the corners of the triangles, each once; -0 is 0. A number of triangles of
@@ -35,7 +35,7 @@
 //   medit INRIA's .mesh in ascii: all vertices, whatever the elements are.
 //   npz   numpy's archive of arrays: the rows of `points`, as npy.
 //   adcirc, 2dm  All nodes in the plane, whatever the elements are; "depth" or "elevation" is beside them.
-// Of ply, off, msh, medit and adcirc, what follows the last point is not looked at.
+// Of ply, off, msh, medit and adcirc, nothing behind the last point is looked at.
 // Points of vtk, vtp, vts, vtu, msh and medit that all have z = 0 are taken in the plane, unless three dimensions or
 // columns are asked for: these formats have a third coordinate there, too.
 // In those of text lines end in LF, CRLF or CR, '#' at the start of a line or after a blank starts a comment, and blank
@@ -63,7 +63,7 @@ struct CloudOptions {
   // Leave out points of which a coordinate is missing (an empty field, NA and the like), NaN, infinite or too large for
   // a double, and count them; otherwise the first one is an error.
   bool skip_invalid = false;
-  // Keep what points have beside coordinates: see PointCloud::attributes. Of tables, columns that a header names.
+  // Keep the attributes of points: see PointCloud::attributes. Of tables, columns that a header names.
   bool keep_attributes = false;
 };
 
@@ -79,7 +79,7 @@ std::string CloudFormatOf(const std::string& path, const std::string& format);
 //             Every line of text is a point, a header, a comment, counted in PointCloud::skipped, or an error.
 // Complexity: one pass; memory for the points, and a buffer of at most about a line; twice the points for an array in
 //             Fortran order.
-// Errors:     of opening and reading; INVALID_ARGUMENT "FILE:LINE: …" for what is not a cloud of finite points of one
+// Errors:     of opening and reading; INVALID_ARGUMENT "FILE:LINE: …" for anything but a cloud of finite points of one
 //             dimension (2 to 6), and for a file of text without points when `dimension` is 0.
 absl::StatusOr<PointCloud> ReadCloud(const std::string& path, const CloudOptions& options = {});
 

@@ -161,7 +161,7 @@ class LasReader {
     return absl::OkStatus();
   }
 
-  // Reads up to byte `end` of the file, and keeps what fits into a header.
+  // Reads up to byte `end` of the file, and keeps as much as fits into a header.
   absl::Status SkipTo(uint64_t end, std::string& kept) {
     char block[1 << 12];
     while (reader_.offset() < end) {

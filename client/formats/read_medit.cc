@@ -39,14 +39,14 @@ class MeditReader {
           absl::StrCat("the file ends; expected ", has_vertices_ ? "Triangles or Tetrahedra" : "Vertices"));
     }
     if (has_end) {
-      // What we have written there are comments with names. It is nothing that a mesh needs, whatever it is.
+      // We write comments with names there. Whatever it is, a mesh does not need it.
       std::string_view line;
       reader_.NextContent(line);
     }
     return MakeMesh();
   }
 
-  // The vertices alone, whatever the elements are. What follows them is not looked at.
+  // The vertices alone, whatever the elements are. Later sections are not looked at.
   absl::Status ReadPoints(const CloudOptions& options, PointCloud& cloud) {
     may_be_invalid_ = options.skip_invalid;
     bool has_end = false;
@@ -65,7 +65,7 @@ class MeditReader {
     }
     WELLSPACE_RETURN_IF_ERROR(fields_.NextWhole("the version", kMaxCount, version));
     while (!has_end && !(ends_with_vertices && has_vertices_) && fields_.Next(word)) {
-      // What follows a word that is not known is skipped up to the next word.
+      // The values of a word that is not known are skipped up to the next word.
       absl::Status status;
       if (word == "End") {
         has_end = true;
@@ -75,6 +75,8 @@ class MeditReader {
         status = ReadVertices();
       } else if (word == "Edges") {
         status = ReadElements(edges_, "edges");
+      } else if (word == "Ridges") {
+        status = ReadRidges();
       } else if (word == "Triangles") {
         status = ReadElements(triangles_, "triangles");
       } else if (word == "Tetrahedra" && mesh_.dimension != 2) {
@@ -115,10 +117,26 @@ class MeditReader {
     for (const int32_t reference : simplices.references) {
       regions_.Add(reference);
     }
+    WELLSPACE_RETURN_IF_ERROR(TakeRidges());
     mesh_.simplices = std::move(simplices.vertices);
     parts_.MoveTo(mesh_);
     regions_.MoveTo(mesh_);
     return std::move(mesh_);
+  }
+
+  // In 3-D the edges that are ridges; in the plane edges are facets.
+  absl::Status TakeRidges() {
+    for (size_t i = 0; i < ridges_.size() && mesh_.dimension == 3; ++i) {
+      const uint64_t edge = ridges_[i];
+      if (edge == 0 || edge > edges_.references.size()) {
+        return absl::InvalidArgumentError(absl::StrCat(reader_.name(), ": Ridges: number ", i + 1,
+                                                       " of them: expected an edge from 1 to ",
+                                                       edges_.references.size(), ", got ", edge));
+      }
+      const std::span<const uint32_t> ends = edges_.At(edge - 1);
+      mesh_.ridges.insert(mesh_.ridges.end(), ends.begin(), ends.end());
+    }
+    return absl::OkStatus();
   }
 
   absl::Status Flatten() {
@@ -181,6 +199,16 @@ class MeditReader {
     return absl::OkStatus();
   }
 
+  // Numbers of edges, which may come later.
+  absl::Status ReadRidges() {
+    uint64_t count = 0;
+    WELLSPACE_RETURN_IF_ERROR(fields_.NextWhole("the number of ridges", kMaxCount, count));
+    for (uint64_t ridge = 0; ridge < count; ++ridge) {
+      WELLSPACE_RETURN_IF_ERROR(fields_.NextWhole("the number of an edge", kMaxCount, ridges_.emplace_back()));
+    }
+    return absl::OkStatus();
+  }
+
   absl::Status ReadReference(const char* what, int32_t& reference) {
     std::string_view field;
     return fields_.Next(field) && absl::SimpleAtoi(absl::string_view(field.data(), field.size()), &reference)
@@ -207,7 +235,8 @@ class MeditReader {
   Elements edges_{.corners = 2};
   Elements triangles_{.corners = 3};
   Elements tetrahedra_{.corners = 4};
-  FacetSorter parts_;  // of facets with another reference than 0
+  std::vector<uint64_t> ridges_;  // of edges_, from 1 on
+  FacetSorter parts_;             // of facets with another reference than 0
   RegionCollector regions_;
   uint64_t vertices_ = 0;
   bool has_vertices_ = false;

@@ -26,8 +26,8 @@
 //         1 on; materials are regions.
 //
 // Regions are where write_mesh.h says; in .msh that is the first physical group of a simplex, or 0. If all simplices
-// are of 0, nothing is told of regions. In .ele all first attributes have to be whole numbers of 32 bits. What is left
-// out of a file of such a mesh is told in Mesh::notes.
+// are of 0, nothing is told of regions. In .ele all first attributes have to be whole numbers of 32 bits. Parts of a
+// file that are left out are told in Mesh::notes.
 #ifndef WELLSPACE_CLIENT_FORMATS_READ_MESH_H_
 #define WELLSPACE_CLIENT_FORMATS_READ_MESH_H_
 
@@ -43,7 +43,7 @@ namespace wellspace::formats {
 //
 // Guarantees: coordinates are those of the file, to the bit; every index of a simplex is that of a vertex. Nothing else
 //             is checked: the simplices need not form a mesh.
-// Errors:     of opening and reading; INVALID_ARGUMENT "FILE:LINE: …" for what is not such a mesh.
+// Errors:     of opening and reading; INVALID_ARGUMENT "FILE:LINE: …" for anything but such a mesh.
 absl::StatusOr<Mesh> ReadMesh(const std::string& path);
 
 // The name of the format in which ReadMesh reads `path`; empty: none.

@@ -3,7 +3,6 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -231,14 +230,8 @@ class PcdReader {
     if (!splitter.Next(text)) {
       return reader_.Error(absl::StrCat("expected a value of field ", Quote(field.name), ", as the header says"));
     }
-    switch (ReadCoordinate(text, value)) {
-      case CoordinateKind::kFinite:
-        break;
-      case CoordinateKind::kInvalid:
-        value = std::numeric_limits<double>::quiet_NaN();
-        break;
-      case CoordinateKind::kNone:
-        return reader_.Error(absl::StrCat("field ", Quote(field.name), ": ", CoordinateError(text).message()));
+    if (!ReadOrNan(text, value)) {
+      return reader_.Error(absl::StrCat("field ", Quote(field.name), ": ", CoordinateError(text).message()));
     }
     if (!field.is_colour()) {
       AddNumber(field, value);

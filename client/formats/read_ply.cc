@@ -48,7 +48,7 @@ class PlyReader {
   }
 
  private:
-  // What a property of the vertices is, if anything.
+  // The meaning of a property of the vertices, if any.
   struct Role {
     int axis = -1;       // of the coordinate that it holds, or -1
     int attribute = -1;  // of the cloud that it is, or -1

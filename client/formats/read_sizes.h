@@ -45,7 +45,7 @@ struct SizeOptions {
 // Reads the sizes of `path` at points of `dimension`, in the order of the file; those that are added come last.
 //
 // Complexity: one pass over the file; memory for all.
-// Errors:     of opening and reading; INVALID_ARGUMENT "FILE:LINE: …" or "FILE[POINT]: …" for what are no sizes at
+// Errors:     of opening and reading; INVALID_ARGUMENT "FILE:LINE: …" or "FILE[POINT]: …" for anything but sizes at
 //             finite points of this dimension, and for a file without any; and to interpolate for a file without
 //             simplices, or for more points than 10 million.
 absl::StatusOr<SizedPoints> ReadSizes(const std::string& path, int dimension, const SizeOptions& options = {});

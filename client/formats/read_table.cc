@@ -24,7 +24,7 @@
 namespace wellspace::formats {
 namespace {
 
-// Which coordinate a field holds; from kMaxDimension on, which attribute.
+// The coordinate that a field holds; from kMaxDimension on, the attribute.
 constexpr int kSkipped = -1;
 
 // The columns that hold coordinates where nothing says which.
@@ -173,7 +173,7 @@ absl::Status TableReader::Choose(std::string_view line, size_t fields, std::vect
     std::iota(columns.begin(), columns.end(), size_t{0});
   }
   if (absl::Status status = CheckDimension(columns); !status.ok()) {
-    // What is no number at all is the better reason.
+    // A text that is no number at all is the better reason.
     const absl::Status row = names_.empty() ? CheckNumbers(line, columns) : absl::OkStatus();
     return row.ok() ? status : row;
   }
@@ -269,15 +269,9 @@ absl::Status TableReader::CountError(size_t fields, size_t coordinates) const {
 void TableReader::TakeAttribute(std::string_view text, size_t field) {
   const int attribute = coordinate_of_field_[field] - kMaxDimension;
   double& value = attributes_[attribute];
-  switch (ReadCoordinate(text, value)) {
-    case CoordinateKind::kFinite:
-      break;
-    case CoordinateKind::kInvalid:
-      value = std::numeric_limits<double>::quiet_NaN();
-      break;
-    case CoordinateKind::kNone:
-      coordinate_of_field_[field] = kSkipped;
-      cloud_.attributes[attribute].values = {};
+  if (!ReadOrNan(text, value)) {
+    coordinate_of_field_[field] = kSkipped;
+    cloud_.attributes[attribute].values = {};
   }
 }
 
@@ -403,7 +397,7 @@ class MoleculeReader {
  private:
   uint64_t rows() const { return cloud_.size() + cloud_.skipped; }
 
-  // Which fields hold coordinates, of the first line, which has a symbol or not.
+  // Chooses the fields with coordinates, by the first line, which has a symbol or not.
   absl::Status Choose(size_t fields, bool has_symbol) {
     constexpr size_t kNamedAxes = 3;
     if (!options_.columns.empty()) {

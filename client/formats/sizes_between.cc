@@ -29,7 +29,7 @@ class EdgeHalver {
   EdgeHalver(double growth, double radius_of_size, SizesBetween& sized)
       : dimension_(static_cast<size_t>(sized.dimension)), sized_(sized) {
     // The mean distance of a place from the corners, weighted by its barycentric coordinates, is at most the radius of
-    // the ball around the simplex: that is what sizes may grow by on the way.
+    // the ball around the simplex: by so much sizes may grow on the way.
     const double ball = std::sqrt(dimension_ / (2.0 * static_cast<double>(dimension_ + 1)));  // per longest edge
     longest_per_size_ = kAboveInterpolated * radius_of_size / (growth * ball);
   }

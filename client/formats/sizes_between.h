@@ -25,7 +25,7 @@ struct SizesBetween {
 // Adds points on the edges of `simplices`, with sizes that are interpolated linearly along these, so many that sizes
 // which grow from points stand for the interpolation: edges are halved, the longest of each simplex first.
 //
-// Shapes:     simplices: rows of dimension + 1 points. Those with a point that `is_left_out` are not looked at.
+// Shapes:     simplices: rows of dimension + 1 points. Simplices with a point that `is_left_out` are not looked at.
 // Units:      growth: of a circumradius, per distance; `radius_of_size`: a circumradius, per size.
 // REQUIRES:   indices are points; those that are not left out have a size above 0.
 // Guarantees: (1) at every place of a simplex, the least over all points of size + growth * distance, as circumradii,

@@ -40,7 +40,7 @@ constexpr std::array<std::string_view, 20> kOtherWords = {
     "id",  "fid", "index", "idx",  "objectid",  "gid",   "name",      "label",    "number",         "pointid",
     "rgb", "red", "green", "blue", "intensity", "alpha", "timestamp", "timestep", "classification", "class"};
 
-// Words of the name in lower case, without what stands in brackets after them.
+// Words of the name in lower case, without the text in brackets after them.
 std::vector<std::string> WordsOf(std::string_view name) {
   std::vector<std::string> words;
   bool in_word = false;
@@ -118,7 +118,7 @@ std::string NameOr(const std::vector<std::string>& names, size_t column) {
   return column < names.size() && !names[column].empty() ? absl::StrCat(" ", Quote(names[column])) : "";
 }
 
-// `line` without what stands between double quotes.
+// `line` without the text between double quotes.
 std::string Unquoted(std::string_view line) {
   std::string text;
   bool is_quoted = false;

@@ -18,7 +18,7 @@ std::vector<std::string> FieldsOf(std::string_view line, char separator);
 // blanks.
 char SeparatorOf(std::string_view line);
 
-// What the names of columns say.
+// The meaning of the names of columns.
 struct NamedColumns {
   std::vector<size_t>
       columns;          // that hold x, y and, if it is there, z, counted from 0; empty if the names do not say it

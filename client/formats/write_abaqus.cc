@@ -182,7 +182,7 @@ class AbaqusWriter final : public MeshWriter {
     output_.Write("\n");
   }
 
-  // What was rounded must not turn an element over, or make it flat.
+  // Rounding must not turn an element over, or make it flat.
   absl::Status CheckOrientation(std::span<const uint32_t> simplex) {
     bool is_rounded = false;
     for (const uint32_t corner : simplex) {
@@ -279,7 +279,7 @@ class AbaqusWriter final : public MeshWriter {
     }
   }
 
-  // Of every part its vertices, for what is fixed, and its faces, for loads and contact.
+  // Of every part its vertices, for fixed boundaries, and its faces, for loads and contact.
   void WriteBoundary() {
     const std::vector<Side> sides = FindSides();
     size_t facet = 0;

@@ -79,10 +79,31 @@ class MeditWriter final : public MeshWriter {
     return output_.status();
   }
 
+  // Edges, and that all of them are ridges: Mmg keeps those.
+  absl::Status AddRidges(std::span<const uint32_t> ridges) override {
+    if (!shape_.boundary.empty()) {
+      BeginFacets();
+    }
+    if (!std::exchange(has_ridges_, true)) {
+      output_.Write(absl::StrCat("Edges\n", shape_.ridge_count, "\n"));
+    }
+    for (; !ridges.empty() && output_.status().ok(); ridges = ridges.subspan(2)) {
+      output_.Write(absl::StrCat(uint64_t{ridges[0]} + 1, " ", uint64_t{ridges[1]} + 1, " 0\n"));
+      ++ridges_;
+    }
+    return output_.status();
+  }
+
   absl::Status Commit() override {
     BeginSimplices();
     if (!shape_.boundary.empty()) {
       BeginFacets();
+    }
+    if (ridges_ > 0) {
+      output_.Write(absl::StrCat("Ridges\n", ridges_, "\n"));
+      for (uint64_t ridge = 1; ridge <= ridges_ && output_.status().ok(); ++ridge) {
+        output_.Write(absl::StrCat(ridge, "\n"));
+      }
     }
     // Behind the end: not every reader knows comments.
     const NameLines names(shape_);
@@ -93,7 +114,8 @@ class MeditWriter final : public MeshWriter {
                                                      .weights = 0,
                                                      .simplex_regions = regions_.count(),
                                                      .simplices = simplices_,
-                                                     .facets = facets_}));
+                                                     .facets = facets_,
+                                                     .ridges = ridges_}));
     return output_.Commit();
   }
 
@@ -116,9 +138,11 @@ class MeditWriter final : public MeshWriter {
   RegionQueue regions_;
   bool has_simplices_ = false;  // the section
   bool has_facets_ = false;     // the section
+  bool has_ridges_ = false;     // the section of their edges
   uint64_t vertices_ = 0;
   uint64_t simplices_ = 0;
   uint64_t facets_ = 0;
+  uint64_t ridges_ = 0;
   std::string line_;
 };
 

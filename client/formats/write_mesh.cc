@@ -24,37 +24,88 @@ namespace {
 
 struct WriterKind {
   absl::StatusOr<std::unique_ptr<MeshWriter>> (*create)(const std::string&, const MeshShape&, std::stop_token);
-  int max_dimension;
+  int max_dimension = 3;
   // Why it cannot go to a pipe or a device; null: it can.
-  const char* needs_file;
-  bool has_weights = true;
+  const char* needs_file = nullptr;
   // All files that a mesh of this name may be; null: that one.
   std::vector<std::string> (*files)(const std::string& path) = nullptr;
+  bool has_weights = false;
   bool has_attributes = false;
-  bool has_regions = true;
+  bool has_regions = false;
+  bool has_parts = false;
+  bool has_ridges = false;
 };
 
 std::span<const Format<WriterKind>> Writers() {
   static const std::vector<Format<WriterKind>> writers = {
-      {"vtu", {".vtu"}, {CreateVtu, 3, nullptr, true, nullptr, true}},
-      {"vtkhdf",
-       {".vtkhdf", ".hdf"},
-       {CreateVtkHdf, 3, "vtkhdf is a file of HDF5, completed from its start", true, nullptr, true}},
-      {"npz",
-       {".npz"},
-       {CreateNpz, kMaxDimension, "npz is a zip archive, completed from its start", true, nullptr, true}},
-      {"msh41", {".msh"}, {CreateMsh41, 3, nullptr}},
-      {"msh22", {}, {CreateMsh22, 3, nullptr}},
-      {"medit", {".mesh"}, {CreateMedit, 3, nullptr, false}},
-      {"node", {".node", ".ele"}, {CreateNodeAndEle, kMaxDimension, "node is a pair of files", true, TetgenFilesOf}},
-      {"vtk", {".vtk"}, {CreateVtk, 3, nullptr, true, nullptr, true}},
-      {"xdmf", {".xdmf"}, {CreateXdmf, 3, "xdmf has its arrays in a file of HDF5 beside it", true, XdmfFilesOf, true}},
-      {"su2", {".su2"}, {CreateSu2, 3, nullptr, false, nullptr, false, false}},
-      {"abaqus", {".inp"}, {CreateAbaqus, 3, nullptr, false}},
-      {"adcirc", {".14", ".grd", ".gr3"}, {CreateAdcirc, 2, nullptr, false, nullptr, true, false}},
-      {"2dm", {".2dm"}, {Create2dm, 2, nullptr, false, nullptr, true}},
+      {.name = "vtu",
+       .extensions = {".vtu"},
+       .handler =
+           {.create = CreateVtu, .has_weights = true, .has_attributes = true, .has_regions = true, .has_parts = true}},
+      {.name = "vtkhdf",
+       .extensions = {".vtkhdf", ".hdf"},
+       .handler = {.create = CreateVtkHdf,
+                   .needs_file = "vtkhdf is a file of HDF5, completed from its start",
+                   .has_weights = true,
+                   .has_attributes = true,
+                   .has_regions = true}},
+      {.name = "npz",
+       .extensions = {".npz"},
+       .handler = {.create = CreateNpz,
+                   .max_dimension = kMaxDimension,
+                   .needs_file = "npz is a zip archive, completed from its start",
+                   .has_weights = true,
+                   .has_attributes = true,
+                   .has_regions = true,
+                   .has_parts = true,
+                   .has_ridges = true}},
+      {.name = "msh41",
+       .extensions = {".msh"},
+       .handler = {.create = CreateMsh41, .has_weights = true, .has_regions = true}},
+      {.name = "msh22", .extensions = {}, .handler = {.create = CreateMsh22, .has_weights = true, .has_regions = true}},
+      {.name = "medit",
+       .extensions = {".mesh"},
+       .handler = {.create = CreateMedit, .has_regions = true, .has_ridges = true}},
+      {.name = "node",
+       .extensions = {".node", ".ele"},
+       .handler = {.create = CreateNodeAndEle,
+                   .max_dimension = kMaxDimension,
+                   .needs_file = "node is a pair of files",
+                   .files = TetgenFilesOf,
+                   .has_weights = true,
+                   .has_regions = true}},
+      {.name = "vtk",
+       .extensions = {".vtk"},
+       .handler = {.create = CreateVtk, .has_weights = true, .has_attributes = true, .has_regions = true}},
+      {.name = "xdmf",
+       .extensions = {".xdmf"},
+       .handler = {.create = CreateXdmf,
+                   .needs_file = "xdmf has its arrays in a file of HDF5 beside it",
+                   .files = XdmfFilesOf,
+                   .has_weights = true,
+                   .has_attributes = true,
+                   .has_regions = true}},
+      {.name = "su2", .extensions = {".su2"}, .handler = {.create = CreateSu2}},
+      {.name = "abaqus", .extensions = {".inp"}, .handler = {.create = CreateAbaqus, .has_regions = true}},
+      {.name = "adcirc",
+       .extensions = {".14", ".grd", ".gr3"},
+       .handler = {.create = CreateAdcirc, .max_dimension = 2, .has_attributes = true}},
+      {.name = "2dm",
+       .extensions = {".2dm"},
+       .handler = {.create = Create2dm, .max_dimension = 2, .has_attributes = true, .has_regions = true}},
   };
   return writers;
+}
+
+// The names of the formats that have a place for something, such as weights.
+std::string FormatsWith(bool WriterKind::*place) {
+  std::vector<std::string> names;
+  for (const Format<WriterKind>& writer : Writers()) {
+    if (writer.handler.*place) {
+      names.push_back(writer.name);
+    }
+  }
+  return absl::StrJoin(names, ", ");
 }
 
 std::string Joined(const std::vector<std::string>& names) {
@@ -63,7 +114,7 @@ std::string Joined(const std::vector<std::string>& names) {
                       names.size() > kShown ? ", ..." : "");
 }
 
-// Notes what `kind` has no place for. A mesh without a word of regions is "domain" of the id 1 everywhere.
+// Notes the arrays that `kind` has no place for. A mesh without a word of regions is "domain" of the id 1 everywhere.
 void NoteLosses(const WriterKind& kind, const MeshShape& shape, MeshWriter& writer) {
   if (!kind.has_attributes && !shape.attributes.empty()) {
     writer.AddNote(absl::StrCat("the format has no place for attributes of vertices, which are left out: ",
@@ -99,17 +150,34 @@ absl::StatusOr<WriterKind> FindWriter(const std::string& path, const std::string
                                                    "-D; expected npz, a file of numpy"));
   }
   if (has_weights && !writer.has_weights) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("cannot write ", path, ": ", (*row)->name,
-                     " has no place for the weights of a mesh; expected vtu, vtkhdf, npz, "
-                     "msh41, msh22, node, vtk or xdmf"));
+    return absl::InvalidArgumentError(absl::StrCat("cannot write ", path, ": ", (*row)->name,
+                                                   " has no place for the weights of a mesh; expected one of ",
+                                                   FormatsWith(&WriterKind::has_weights)));
   }
   return writer;
 }
 
 }  // namespace
 
+std::string PartFileOf(const std::string& path, const std::string& extension, uint32_t part) {
+  return absl::StrCat(path.substr(0, path.size() - ExtensionOf(path).size()), "_", part, extension);
+}
+
 std::vector<std::string> MeshFormats() { return FormatNames(Writers()); }
+
+std::string ExtensionOfMesh(const std::string& format) {
+  constexpr std::string_view kFamily = "msh";
+  std::string_view of_family;
+  for (const Format<WriterKind>& writer : Writers()) {
+    if (writer.name.starts_with(kFamily) && !writer.extensions.empty()) {
+      of_family = writer.extensions[0];  // that of another version, which the extension stands for
+    }
+    if (writer.name == format) {
+      return writer.extensions.empty() ? std::string(of_family) : writer.extensions[0];
+    }
+  }
+  return "";
+}
 
 bool HasPlaceForAttributes(const std::string& path, const std::string& format) {
   const absl::StatusOr<WriterKind> writer = FindWriter(path, format, /*dimension=*/0, /*has_weights=*/false);
@@ -163,15 +231,26 @@ absl::Status CheckComplete(const MeshShape& shape, const RowCounts& rows) {
   if (rows.facets != shape.facet_count()) {
     return absl::InternalError(absl::StrCat("a mesh of ", shape.facet_count(), " boundary facets got ", rows.facets));
   }
+  if (rows.ridges != shape.ridge_count) {
+    return absl::InternalError(absl::StrCat("a mesh of ", shape.ridge_count, " ridges got ", rows.ridges));
+  }
   return absl::OkStatus();
 }
 
 absl::StatusOr<std::unique_ptr<MeshWriter>> CreateMesh(const std::string& path, const std::string& format,
                                                        const MeshShape& shape, std::stop_token stop) {
   WELLSPACE_ASSIGN_OR_RETURN(const WriterKind writer, FindWriter(path, format, shape.dimension, shape.has_weights));
+  if (shape.part != nullptr && !writer.has_parts) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("cannot write ", path, ": the format has no place for the numbers of a part; expected one of ",
+                     FormatsWith(&WriterKind::has_parts)));
+  }
   MeshShape held = shape;
   if (!writer.has_attributes) {
     held.attributes.clear();
+  }
+  if (!writer.has_ridges) {
+    held.ridge_count = 0;
   }
   WELLSPACE_ASSIGN_OR_RETURN(std::unique_ptr<MeshWriter> created, writer.create(path, held, std::move(stop)));
   NoteLosses(writer, shape, *created);
@@ -205,6 +284,9 @@ absl::Status WriteMesh(const std::string& path, const std::string& format, const
   }
   if (status.ok() && !mesh.facets.empty()) {
     status = rows.AddFacets(mesh.facets);
+  }
+  if (status.ok() && !mesh.ridges.empty()) {
+    status = rows.AddRidges(mesh.ridges);
   }
   if (status.ok()) {
     status = rows.Commit();

@@ -32,7 +32,7 @@
 //
 // With a boundary there are, beside that:
 //   vtu, vtkhdf  its facets as cells after the simplices; cell data "region" and "boundary" (the tag), 0 where there is
-//         none; point data "origin", below 0 for what is no input point (SignedOrigin), and "boundary".
+//         none; point data "origin", below 0 for vertices that are no input points (SignedOrigin), and "boundary".
 //   npz   `facets`, `facet_tags`, `facet_names` with their tags in `facet_name_tags`, `regions`, `vertex_origins`,
 //         `vertex_tags`.
 //   node  .edge in 2-D, .face above, with markers; .poly up to 3-D; tags of vertices as markers of .node; the region as
@@ -52,6 +52,13 @@
 //
 // Attributes of vertices, which input points have and others have not, are numbers of 8 bytes, NaN where there is none:
 // point data of vtu, vtkhdf, vtk and xdmf under their names, "attribute_NAME" in npz. Other formats leave them out.
+//
+// A part of a larger mesh (mesh_part.h) is held by vtu and npz alone. vtu: point data "GlobalPointIds", "owner", "row"
+// and "vtkGhostType", cell data "GlobalCellIds", "owner" and "vtkGhostType". npz: `vertex_ids`, `vertex_owners`,
+// `vertex_rows`, `simplex_ids`, `simplex_owners`, `facet_ids`, and `part`: the numbers of the part, of parts, of own
+// vertices and of own simplices.
+//
+// Edges along the creases of a surface are `ridges` of npz, and Edges that Ridges names of medit.
 //
 // Where regions are told, each simplex has the id of its own: cell data "region" of vtu, vtkhdf and vtk; `regions` of
 // npz, with names in `region_names` for the ids in `region_ids`; the attribute of .ele; the reference of medit; the
@@ -79,11 +86,14 @@ namespace wellspace::formats {
 // The names that `format` may take below.
 std::vector<std::string> MeshFormats();
 
+// The extension that files of `format` have, with its dot; empty for an unknown format.
+std::string ExtensionOfMesh(const std::string& format);
+
 // Whether a mesh in `path` and `format` has attributes of its vertices.
 bool HasPlaceForAttributes(const std::string& path, const std::string& format);
 
-// The files that WriteMesh makes of `path` and `format`: that one, or a pair. What cannot be written is taken for one
-// file.
+// The files that WriteMesh makes of `path` and `format`: that one, or a pair. A format that cannot be written is taken
+// for one file.
 std::vector<std::string> FilesOfMeshWritten(const std::string& path, const std::string& format);
 
 // Tells early whether WriteMesh would refuse `path` and `format` for a mesh of `dimension` (0: not known yet) that may
@@ -106,8 +116,8 @@ class MeshWriter {
   MeshWriter& operator=(const MeshWriter&) = delete;
 
   // The next rows of the arrays: all points, then all weights if the shape has them, then all origins and all tags of
-  // vertices if it has marks, then each of its attributes, then all regions of simplices if it has them, then all
-  // simplices, then all facets of its boundary. Returns the first error of all so far.
+  // vertices if it has marks, then each of its attributes. All regions of simplices follow, if it has them, then all
+  // simplices, all facets of its boundary, and all ridges. Returns the first error of all so far.
   // REQUIRES:   whole rows, no more than the shape says, nothing of an array before another that goes first.
   virtual absl::Status AddPoints(std::span<const double> points) = 0;
   virtual absl::Status AddWeights(std::span<const double> weights) = 0;
@@ -118,12 +128,15 @@ class MeshWriter {
   virtual absl::Status AddSimplexRegions(std::span<const int32_t> regions) = 0;
   virtual absl::Status AddSimplices(std::span<const uint32_t> simplices) = 0;
   virtual absl::Status AddFacets(std::span<const uint32_t> facets) = 0;
+  // Ignored by formats without a place for ridges.
+  virtual absl::Status AddRidges(std::span<const uint32_t> /*ridges*/) { return absl::OkStatus(); }
 
   // Gives the file its name. Without it, no file is left or changed.
   // Errors:     the first of all so far; INTERNAL when rows are missing.
   virtual absl::Status Commit() = 0;
 
-  // What of the mesh the file holds otherwise than it came, or not at all, a sentence each; all of it after Commit.
+  // The parts of the mesh that the file holds otherwise than they came, or not at all, a sentence each; all of it after
+  // Commit.
   const std::vector<std::string>& notes() const { return notes_; }
   // An empty one is none.
   void AddNote(std::string note) {

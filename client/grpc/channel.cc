@@ -103,14 +103,14 @@ class TokenSource {
   std::string file_;
 };
 
-// What a channel knows of its server, for all its calls.
+// The knowledge of a channel about its server, for all its calls.
 struct Way {
   TokenSource token;
   std::string host;
   std::optional<Proxy> proxy;
 };
 
-// Adds the token to what a call sends; tells servers that cannot be trusted from those that cannot be reached, and by
+// Adds the token to a call's metadata; tells servers that cannot be trusted from those that cannot be reached, and by
 // which proxy that was.
 class CredentialsInterceptor final : public grpc::experimental::Interceptor {
  public:
@@ -119,7 +119,7 @@ class CredentialsInterceptor final : public grpc::experimental::Interceptor {
   void Intercept(grpc::experimental::InterceptorBatchMethods* methods) override {
     using grpc::experimental::InterceptionHookPoints;
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_INITIAL_METADATA) && way_.token.exists()) {
-      // Without a token that can be read, the server says what it thinks of that.
+      // Without a token that can be read, the server answers with its own error.
       if (const absl::StatusOr<std::string> token = way_.token.Read(); token.ok()) {
         methods->GetSendInitialMetadata()->emplace("authorization", absl::StrCat("Bearer ", *token));
       }
@@ -131,7 +131,7 @@ class CredentialsInterceptor final : public grpc::experimental::Interceptor {
   }
 
  private:
-  // gRPC knows only that it could not connect. What has details is the server's own word.
+  // gRPC knows only that it could not connect. Errors with details are the server's own.
   void Explain(grpc::Status& status) const {
     if (status.error_code() != grpc::StatusCode::UNAVAILABLE || !status.error_details().empty()) {
       return;

@@ -16,7 +16,7 @@ namespace wellspace::client {
 // calls with UNAUTHENTICATED, at once. Loopback addresses are reached without a proxy, whatever the environment says;
 // where one is between, the errors of connecting name it.
 //
-// Errors:     INVALID_ARGUMENT: the address; options that contradict each other; a file that has not what it should
+// Errors:     INVALID_ARGUMENT: the address; options that contradict each other; a file without the contents it should
 //             have. FAILED_PRECONDITION: the token would leave this machine in plain text. NOT_FOUND: a file cannot be
 //             read.
 absl::StatusOr<std::shared_ptr<grpc::Channel>> OpenChannel(const std::string& address, const ConnectOptions& options,

@@ -11,14 +11,14 @@
 namespace wellspace::client {
 namespace {
 
-// Above what the server sends (chunks of at most 1 MiB).
+// Above the largest message of a server (chunks of at most 1 MiB).
 constexpr int kMaxResponseBytes = 4 * 1024 * 1024;
 
 // A server whose machine has vanished is noticed by pings.
 constexpr int kKeepaliveMs = 20'000;
 constexpr int kKeepaliveTimeoutMs = 10'000;
 
-// How soon after a lost connection a new one is tried, and how much later each time.
+// The delay of the first attempt after a lost connection, and the largest delay of a later one.
 constexpr int kInitialReconnectMs = 200;
 constexpr int kMaxReconnectMs = 5'000;
 

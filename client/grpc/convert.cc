@@ -9,6 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/error_details.h"
+#include "client/grpc/feature_messages.h"
 #include "client/grpc/mesh_values.h"
 #include "client/printable.h"
 #include "google/protobuf/descriptor.h"
@@ -49,20 +50,18 @@ SessionState StateFromProto(v1::Session::State state) {
   }
 }
 
-// None for one of a newer server.
-std::optional<FaceRule> RuleFromProto(v1::FaceRule rule) {
-  switch (rule) {
-    case v1::FACE_RULE_BOX:
-      return FaceRule::kBox;
-    case v1::FACE_RULE_HOLES:
-      return FaceRule::kHoles;
-    case v1::FACE_RULE_EVEN_ODD:
-      return FaceRule::kEvenOdd;
-    case v1::FACE_RULE_UNION:
-      return FaceRule::kUnion;
-    default:
-      return std::nullopt;
-  }
+// Without triangles and seeds.
+SurfaceFeatures SurfaceFromProto(const v1::SurfaceOptions& message) {
+  const auto get = [](bool is_given, double value) { return is_given ? std::optional(value) : std::nullopt; };
+  SurfaceFeatures surface;
+  surface.solids = message.solids() == v1::SOLID_RULE_HOLES     ? SolidRule::kHoles
+                   : message.solids() == v1::SOLID_RULE_WINDING ? SolidRule::kWinding
+                                                                : SolidRule::kEvenOdd;
+  surface.crease_angle = get(message.has_crease_angle(), message.crease_angle());
+  surface.weld = get(message.has_weld(), message.weld());
+  surface.min_patch = get(message.has_min_patch(), message.min_patch());
+  surface.resolution = get(message.has_resolution(), message.resolution());
+  return surface;
 }
 
 OperationState StateFromProto(v1::Operation::State state) {
@@ -131,6 +130,31 @@ SliverReason ReasonFromProto(v1::SliverReason reason) {
   }
 }
 
+SurfaceStatistics SurfaceFromProto(const v1::SurfaceStatistics& surface) {
+  return {.triangles = surface.triangles(),
+          .welded_points = surface.welded_points(),
+          .dropped_triangles = surface.dropped_triangles(),
+          .flipped_triangles = surface.flipped_triangles(),
+          .unmeshed_points = surface.unmeshed_points(),
+          .patches = surface.patches(),
+          .curves = surface.curves(),
+          .corners = surface.corners(),
+          .solids = surface.solids(),
+          .facets = surface.facets(),
+          .ridges = surface.ridges(),
+          .lost_ridges = surface.lost_ridges(),
+          .exempt_simplices = surface.exempt_simplices(),
+          .acute_curves = surface.acute_curves(),
+          .tube_simplices = surface.tube_simplices(),
+          .min_angle_outside_deg = surface.min_angle_outside_deg(),
+          .unused_seeds = surface.unused_seeds(),
+          .first_unused_seed = surface.first_unused_seed(),
+          .min_facet_angle_deg = surface.min_facet_angle_deg(),
+          .deviation_of_facets = surface.deviation_of_facets(),
+          .deviation_of_surface = surface.deviation_of_surface(),
+          .volumes = VectorOf(surface.volumes())};
+}
+
 MeshStatistics StatisticsFromProto(const v1::MeshStatistics& message) {
   MeshStatistics statistics;
   statistics.input_points = message.input_points();
@@ -149,6 +173,9 @@ MeshStatistics StatisticsFromProto(const v1::MeshStatistics& message) {
                          .min_input_angle_deg = domain.min_input_angle_deg(),
                          .unused_seeds = domain.unused_seeds(),
                          .first_unused_seed = domain.first_unused_seed()};
+  }
+  if (message.has_surface()) {
+    statistics.surface = SurfaceFromProto(message.surface());
   }
   statistics.vertices = message.vertices();
   statistics.simplices = message.simplices();
@@ -184,6 +211,35 @@ MeshStatistics StatisticsFromProto(const v1::MeshStatistics& message) {
   return statistics;
 }
 
+void SetSurface(const SurfaceParameters& surface, v1::MeshParameters* parameters) {
+  if (surface == SurfaceParameters()) {
+    return;
+  }
+  v1::SurfaceParameters& message = *parameters->mutable_surface();
+  const auto set = [&message](const std::optional<double>& value, auto setter) {
+    if (value.has_value()) {
+      (message.*setter)(*value);
+    }
+  };
+  set(surface.tolerance, &v1::SurfaceParameters::set_tolerance);
+  set(surface.min_facet_angle, &v1::SurfaceParameters::set_min_facet_angle);
+  set(surface.edge_length, &v1::SurfaceParameters::set_edge_length);
+  set(surface.min_size, &v1::SurfaceParameters::set_min_size);
+  set(surface.outside_rho, &v1::SurfaceParameters::set_outside_rho);
+  set(surface.curvature_elements, &v1::SurfaceParameters::set_curvature_elements);
+  set(surface.thickness_layers, &v1::SurfaceParameters::set_thickness_layers);
+}
+
+v1::Criterion CriterionToProto(Criterion criterion) {
+  switch (criterion) {
+    case Criterion::kWellSpaced:
+      return v1::CRITERION_WELL_SPACED;
+    case Criterion::kRadiusEdge:
+      break;
+  }
+  return v1::CRITERION_RADIUS_EDGE;
+}
+
 }  // namespace
 
 void SetDuration(absl::Duration duration, google::protobuf::Duration* message) {
@@ -200,8 +256,7 @@ void SetParameters(const MeshOptions& options, v1::MeshParameters* parameters) {
   };
   parameters->set_dimension(options.dimension);
   set(options.rho, &v1::MeshParameters::set_rho);
-  parameters->set_criterion(options.criterion == Criterion::kWellSpaced ? v1::CRITERION_WELL_SPACED
-                                                                        : v1::CRITERION_RADIUS_EDGE);
+  parameters->set_criterion(CriterionToProto(options.criterion));
   set(options.max_circumradius, &v1::MeshParameters::set_max_circumradius);
   set(options.edge_length, &v1::MeshParameters::set_edge_length);
   set(options.gradation, &v1::MeshParameters::set_gradation);
@@ -219,6 +274,7 @@ void SetParameters(const MeshOptions& options, v1::MeshParameters* parameters) {
   parameters->set_pump_weights(options.pump_weights);
   set(options.merge_distance, &v1::MeshParameters::set_merge_distance);
   parameters->set_keep_vertices(options.keep_vertices);
+  SetSurface(options.surface_parameters, parameters);
   parameters->set_margin(options.margin);
   set(options.max_vertices, &v1::MeshParameters::set_max_vertices);
   set(options.threads, &v1::MeshParameters::set_threads);
@@ -242,6 +298,15 @@ MeshOptions OptionsFromProto(const v1::MeshParameters& parameters) {
   options.pump_weights = parameters.pump_weights();
   options.merge_distance = get(parameters.has_merge_distance(), parameters.merge_distance());
   options.keep_vertices = parameters.keep_vertices();
+  const v1::SurfaceParameters& surface = parameters.surface();
+  options.surface_parameters = {
+      .tolerance = get(surface.has_tolerance(), surface.tolerance()),
+      .min_facet_angle = get(surface.has_min_facet_angle(), surface.min_facet_angle()),
+      .edge_length = get(surface.has_edge_length(), surface.edge_length()),
+      .min_size = get(surface.has_min_size(), surface.min_size()),
+      .outside_rho = get(surface.has_outside_rho(), surface.outside_rho()),
+      .curvature_elements = get(surface.has_curvature_elements(), surface.curvature_elements()),
+      .thickness_layers = get(surface.has_thickness_layers(), surface.thickness_layers())};
   options.domain_low = VectorOf(parameters.domain().low());
   options.domain_high = VectorOf(parameters.domain().high());
   if (parameters.has_margin()) {
@@ -274,6 +339,7 @@ MeshHeader HeaderFromProto(const v1::MeshMetadata& metadata) {
                     .moved_vertex_count = metadata.moved_vertex_count(),
                     .boundary = {},
                     .facet_count = metadata.facet_count(),
+                    .ridge_count = metadata.ridge_count(),
                     .regions = {},
                     .has_simplex_regions = metadata.has_simplex_regions(),
                     .has_vertex_marks = metadata.has_vertex_marks(),
@@ -308,7 +374,7 @@ ServerInfo InfoFromProto(const v1::GetServerInfoResponse& response) {
 }
 
 absl::StatusOr<Session> SessionFromProto(const v1::Session& message) {
-  // What a client reads files by, and sends arrays by. 0: not told.
+  // The sizes by which a client reads files, and sends arrays. 0: not told.
   if (message.parameters().dimension() < 0 || message.parameters().dimension() > kMaxDimension) {
     return Contradiction("a session in ", message.parameters().dimension(), "-D");
   }
@@ -326,11 +392,11 @@ absl::StatusOr<Session> SessionFromProto(const v1::Session& message) {
                  .last_operation = message.last_operation(),
                  .segment_count = message.segment_count(),
                  .seed_count = message.seed_count(),
-                 .faces = RuleFromProto(message.faces()),
-                 .crossings = message.crossings() == v1::CROSSING_RULE_SPLIT  ? CrossingRule::kSplit
-                              : message.crossings() == v1::CROSSING_RULE_SNAP ? CrossingRule::kSnap
-                                                                              : CrossingRule::kRefuse,
+                 .faces = FaceRuleFromProto(message.faces()),
+                 .crossings = CrossingRuleFromProto(message.crossings()),
                  .snap_distance = message.has_snap_distance() ? std::optional(message.snap_distance()) : std::nullopt,
+                 .triangle_count = message.triangle_count(),
+                 .surface = message.has_surface() ? std::optional(SurfaceFromProto(message.surface())) : std::nullopt,
                  .size_count = message.size_count(),
                  .stored_bytes = message.stored_bytes()};
 }

@@ -66,7 +66,7 @@ uint64_t MostOf(const v1::KeptRows& rows) {
   return std::max({rows.skipped_size(), rows.kept_size(), rows.added_size()});
 }
 
-// Appends what the runs make of rows of `base` and of `added`.
+// Appends the rows that the runs take from `base` and from `added`.
 template <typename T, typename Added>
 void JoinRuns(const std::vector<Run>& runs, const std::vector<T>& base, Added added, size_t width,
               std::vector<T>* joined) {
@@ -163,7 +163,8 @@ bool HasChecksums(const Mesh& mesh, const v1::MeshChecksums& checksums) {
          HasChecksum(mesh.input_vertex, checksums.input_vertices()) &&
          HasChecksum(mesh.vertex_origins, checksums.vertex_origins()) &&
          HasChecksum(mesh.vertex_tags, checksums.vertex_tags()) &&
-         HasChecksum(mesh.simplex_regions, checksums.simplex_regions()) && HasChecksum(mesh.facets, checksums.facets());
+         HasChecksum(mesh.simplex_regions, checksums.simplex_regions()) &&
+         HasChecksum(mesh.facets, checksums.facets()) && HasChecksum(mesh.ridges, checksums.ridges());
 }
 
 // Whether there can be a mesh with this header and these arrays.
@@ -172,6 +173,7 @@ absl::Status CheckArrays(const MeshHeader& header, const Mesh& mesh) {
   WELLSPACE_RETURN_IF_ERROR(CheckWeights(mesh.weights));
   WELLSPACE_RETURN_IF_ERROR(CheckVertices(header, "simplices", mesh.simplices));
   WELLSPACE_RETURN_IF_ERROR(CheckVertices(header, "facets", mesh.facets));
+  WELLSPACE_RETURN_IF_ERROR(CheckVertices(header, "ridges", mesh.ridges));
   WELLSPACE_RETURN_IF_ERROR(CheckInputVertices(header, mesh.input_vertex));
   WELLSPACE_RETURN_IF_ERROR(CheckOrigins(header, mesh.vertex_origins));
   WELLSPACE_RETURN_IF_ERROR(CheckTags(header, mesh.vertex_tags));
@@ -218,23 +220,24 @@ absl::Status DeltaReceiver::AddPart(const v1::MeshDelta& part) {
 absl::Status DeltaReceiver::CheckSizes() const {
   const uint64_t dimension = header_.dimension;
   const auto fits = [](uint64_t count, uint64_t most) { return count <= most; };
-  const bool do_fit = fits(delta_.changed_points_size(), header_.vertex_count) &&
-                      fits(delta_.points_size(), header_.vertex_count * dimension) &&
-                      fits(delta_.changed_weights_size(), header_.vertex_count) &&
-                      fits(delta_.weights_size(), header_.vertex_count) &&
-                      fits(MostOf(delta_.kept_simplices()), header_.simplex_count) &&
-                      fits(delta_.simplices_size(), header_.simplex_count * (dimension + 1)) &&
-                      fits(delta_.changed_input_vertices_size(), header_.input_point_count) &&
-                      fits(delta_.input_vertices_size(), header_.input_point_count) &&
-                      fits(delta_.moved_vertices_size(), header_.moved_vertex_count) &&
-                      fits(delta_.changed_vertex_origins_size(), header_.vertex_count) &&
-                      fits(delta_.vertex_origins_size(), header_.vertex_count) &&
-                      fits(delta_.changed_vertex_tags_size(), header_.vertex_count) &&
-                      fits(delta_.vertex_tags_size(), header_.vertex_count) &&
-                      fits(delta_.changed_simplex_regions_size(), header_.simplex_count) &&
-                      fits(delta_.simplex_regions_size(), header_.simplex_count) &&
-                      fits(MostOf(delta_.kept_facets()), header_.facet_count) &&
-                      fits(delta_.facets_size(), header_.facet_count * dimension);
+  const bool do_fit =
+      fits(delta_.changed_points_size(), header_.vertex_count) &&
+      fits(delta_.points_size(), header_.vertex_count * dimension) &&
+      fits(delta_.changed_weights_size(), header_.vertex_count) && fits(delta_.weights_size(), header_.vertex_count) &&
+      fits(MostOf(delta_.kept_simplices()), header_.simplex_count) &&
+      fits(delta_.simplices_size(), header_.simplex_count * (dimension + 1)) &&
+      fits(delta_.changed_input_vertices_size(), header_.input_point_count) &&
+      fits(delta_.input_vertices_size(), header_.input_point_count) &&
+      fits(delta_.moved_vertices_size(), header_.moved_vertex_count) &&
+      fits(delta_.changed_vertex_origins_size(), header_.vertex_count) &&
+      fits(delta_.vertex_origins_size(), header_.vertex_count) &&
+      fits(delta_.changed_vertex_tags_size(), header_.vertex_count) &&
+      fits(delta_.vertex_tags_size(), header_.vertex_count) &&
+      fits(delta_.changed_simplex_regions_size(), header_.simplex_count) &&
+      fits(delta_.simplex_regions_size(), header_.simplex_count) &&
+      fits(MostOf(delta_.kept_facets()), header_.facet_count) &&
+      fits(delta_.facets_size(), header_.facet_count * dimension) &&
+      fits(MostOf(delta_.kept_ridges()), header_.ridge_count) && fits(delta_.ridges_size(), header_.ridge_count * 2);
   return do_fit ? absl::OkStatus() : MisfitOf("larger than the mesh of ", header_.vertex_count, " vertices");
 }
 
@@ -265,6 +268,8 @@ absl::Status DeltaReceiver::Apply() {
   WELLSPACE_RETURN_IF_ERROR(
       ApplyKept(mesh_.facets, delta.kept_facets(), delta.facets(), dimension, header_.facet_count, &next.facets)
           .status());
+  WELLSPACE_RETURN_IF_ERROR(
+      ApplyKept(mesh_.ridges, delta.kept_ridges(), delta.ridges(), 2, header_.ridge_count, &next.ridges).status());
   WELLSPACE_RETURN_IF_ERROR(ReadList(delta.moved_vertices(), vertices, &next.moved_vertices));
   if (next.moved_vertices.size() != header_.moved_vertex_count || !HasChecksums(next, checksums_)) {
     return MisfitOf("that makes another mesh than that of revision ", header_.revision);

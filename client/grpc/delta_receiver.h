@@ -23,7 +23,7 @@ class DeltaReceiver {
   // The stream broke off, and another follows: the differences since mesh.revision, the first from next_part() on.
   void Continue() { expects_metadata_ = true; }
 
-  // Errors:     of both: DATA_LOSS, naming what is wrong: the answer is damaged, or the mesh is not the one that the
+  // Errors:     of both: DATA_LOSS, naming the fault: the answer is damaged, or the mesh is not the one that the
   //             server has had at its revision. A whole download helps.
   absl::Status SetMetadata(const v1::MeshMetadata& metadata);
   absl::Status AddPart(const v1::MeshDelta& part);
@@ -36,7 +36,7 @@ class DeltaReceiver {
   uint64_t part_count() const { return header_.chunk_count; }
 
  private:
-  // Whether what has come can be of meshes as large as these.
+  // Whether the parts so far can be of meshes as large as these.
   absl::Status CheckSizes() const;
   // Makes the mesh that of the difference.
   absl::Status Apply();

@@ -41,12 +41,17 @@ class GrpcConnection final : public Connection {
   absl::StatusOr<PointsLeft> RemovePoints(const std::string& session, std::span<const uint64_t> points,
                                           const CallOptions& call) override;
 
-  // transfers.cc
-  absl::StatusOr<Uploaded> UploadPoints(const std::string& session, PointSource& source, std::optional<uint64_t> offset,
-                                        const OnPoints& on_points, const CallOptions& call) override;
+  // add_features.cc
   absl::StatusOr<AddedSegments> AddSegments(const std::string& session, const Features& features,
                                             const std::optional<FeatureOffset>& offset,
                                             const CallOptions& call) override;
+  absl::StatusOr<AddedTriangles> AddTriangles(const std::string& session, const SurfaceFeatures& surface,
+                                              const std::optional<SurfaceOffset>& offset,
+                                              const CallOptions& call) override;
+
+  // transfers.cc
+  absl::StatusOr<Uploaded> UploadPoints(const std::string& session, PointSource& source, std::optional<uint64_t> offset,
+                                        const OnPoints& on_points, const CallOptions& call) override;
   absl::StatusOr<SizesSet> SetSizes(const std::string& session, const SizeSamples& samples,
                                     const CallOptions& call) override;
   absl::StatusOr<SizesSet> SetVertexSizes(const std::string& session, const VertexSizes& sizes,
@@ -78,7 +83,8 @@ class GrpcConnection final : public Connection {
   absl::StatusOr<Located> Locate(const std::string& session, std::span<const double> points,
                                  const LocateOptions& options, const CallOptions& call) override;
   absl::StatusOr<AddedVertices> AddVertices(const std::string& session, std::span<const double> points,
-                                            std::span<const uint32_t> near, const CallOptions& call) override;
+                                            std::span<const uint32_t> near, const OnAdded& on_added,
+                                            const CallOptions& call) override;
 
  private:
   // Makes a unary call until its status is final; the answer is in `response`.
@@ -95,6 +101,9 @@ class GrpcConnection final : public Connection {
   absl::StatusOr<SizesSet> SendAllSizes(const std::string& session, size_t count, const CallOptions& call,
                                         const FillSizesRequest& fill);
 
+  // One request of AddVertices.
+  absl::StatusOr<AddedVertices> AddSome(const v1::AddVerticesRequest& request, const CallOptions& call);
+
   // One attempt at GetSession.
   absl::StatusOr<v1::Session> FetchSession(const std::string& session, const Attempt& attempt);
 
@@ -104,6 +113,22 @@ class GrpcConnection final : public Connection {
   const std::unique_ptr<v1::OperationService::Stub> operations_;
   const std::unique_ptr<v1::QueryService::Stub> queries_;
   const std::unique_ptr<grpc::health::v1::Health::Stub> health_;
+};
+
+// The options of the requests that a call makes one after the other: together they take no longer than it may.
+class CallInParts {
+ public:
+  explicit CallInParts(const CallOptions& call) : part_(call), deadline_(SinceBoot() + call.timeout) {}
+
+  // The options of the next request.
+  const CallOptions& Next() {
+    part_.timeout = deadline_ - SinceBoot();
+    return part_;
+  }
+
+ private:
+  CallOptions part_;
+  const absl::Duration deadline_;
 };
 
 // The largest number of whole rows of `row` doubles that a request of less than 1 MiB holds; at least 1.

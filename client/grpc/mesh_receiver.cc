@@ -22,8 +22,9 @@ constexpr uint64_t kMaxVertices = std::numeric_limits<uint32_t>::max();
 constexpr uint64_t kMaxSimplices = uint64_t{1} << 40;
 constexpr uint64_t kMaxInputPoints = uint64_t{1} << 40;
 
-constexpr const char* kArrayNames[] = {"points",          "weights",   "vertex origins", "vertex tags",
-                                       "simplex regions", "simplices", "input vertices", "facets"};
+constexpr const char* kArrayNames[] = {"points",         "weights",         "vertex origins",
+                                       "vertex tags",    "simplex regions", "simplices",
+                                       "input vertices", "facets",          "ridges"};
 
 template <typename T>
 std::span<const T> SpanOf(const google::protobuf::RepeatedField<T>& values) {
@@ -35,7 +36,7 @@ uint32_t ChecksumOf(const google::protobuf::RepeatedField<T>& values) {
   return Crc32c(values.data(), values.size() * sizeof(T));
 }
 
-// Calls visit(values) with what the chunk has of the array number `array`, in the order of MeshReceiver::Array.
+// Calls visit(values) with the chunk's values of the array number `array`, in the order of MeshReceiver::Array.
 template <typename Visit>
 auto VisitArray(const v1::MeshChunk& chunk, int array, Visit visit) {
   switch (array) {
@@ -53,8 +54,10 @@ auto VisitArray(const v1::MeshChunk& chunk, int array, Visit visit) {
       return visit(chunk.simplices());
     case 6:
       return visit(chunk.input_vertices());
-    default:
+    case 7:
       return visit(chunk.facets());
+    default:
+      return visit(chunk.ridges());
   }
 }
 
@@ -73,7 +76,8 @@ bool IsTheSame(const MeshHeader& a, const MeshHeader& b) {
          a.simplex_count == b.simplex_count && a.input_point_count == b.input_point_count &&
          a.chunk_count == b.chunk_count && a.has_weights == b.has_weights &&
          a.moved_vertex_count == b.moved_vertex_count && a.boundary == b.boundary && a.regions == b.regions &&
-         a.has_simplex_regions == b.has_simplex_regions && a.has_vertex_marks == b.has_vertex_marks;
+         a.has_simplex_regions == b.has_simplex_regions && a.has_vertex_marks == b.has_vertex_marks &&
+         a.ridge_count == b.ridge_count;
 }
 
 absl::Status CheckBoundary(const MeshHeader& header) {
@@ -89,6 +93,9 @@ absl::Status CheckBoundary(const MeshHeader& header) {
   }
   if (facets != header.facet_count || header.facet_count > kMaxSimplices) {
     return Contradiction("parts of the boundary with ", facets, " facets, ", header.facet_count, " in all");
+  }
+  if (header.ridge_count > kMaxSimplices) {
+    return Contradiction(header.ridge_count, " ridges are more than can be");
   }
   std::set<int32_t> regions;
   for (const Region& region : header.regions) {
@@ -142,7 +149,11 @@ absl::Status CheckHeader(const MeshHeader& header, const MeshExpectation& expect
 }
 
 uint64_t MeshReceiver::WidthOf(int array) const {
-  return array == kPoints || array == kFacets ? header_.dimension : array == kSimplices ? header_.dimension + 1 : 1;
+  constexpr uint64_t kEnds = 2;
+  return array == kPoints || array == kFacets ? header_.dimension
+         : array == kSimplices                ? header_.dimension + 1
+         : array == kRidges                   ? kEnds
+                                              : 1;
 }
 
 uint64_t MeshReceiver::SizeOf(int array) const {
@@ -154,7 +165,8 @@ uint64_t MeshReceiver::SizeOf(int array) const {
                                               if_any(header_.has_simplex_regions, header_.simplex_count),
                                               header_.simplex_count,
                                               header_.input_point_count,
-                                              header_.facet_count};
+                                              header_.facet_count,
+                                              header_.ridge_count};
   return rows[array] * WidthOf(array);
 }
 
@@ -267,8 +279,10 @@ absl::Status MeshReceiver::CheckValues(Array array, const v1::MeshChunk& chunk) 
       return CheckVertices(header_, kArrayNames[array], SpanOf(chunk.simplices()));
     case kInputVertices:
       return CheckInputVertices(header_, SpanOf(chunk.input_vertices()));
-    default:
+    case kFacets:
       return CheckVertices(header_, kArrayNames[array], SpanOf(chunk.facets()));
+    default:
+      return CheckVertices(header_, kArrayNames[array], SpanOf(chunk.ridges()));
   }
 }
 
@@ -291,8 +305,10 @@ absl::Status MeshReceiver::Pass(Array array, const v1::MeshChunk& chunk) {
       return sink_.AddSimplices(SpanOf(chunk.simplices()));
     case kInputVertices:
       return sink_.AddInputVertices(SpanOf(chunk.input_vertices()));
-    default:
+    case kFacets:
       return sink_.AddFacets(SpanOf(chunk.facets()));
+    default:
+      return sink_.AddRidges(SpanOf(chunk.ridges()));
   }
 }
 

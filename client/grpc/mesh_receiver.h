@@ -12,7 +12,7 @@
 
 namespace wellspace::client {
 
-// What a mesh is known to be.
+// The known facts about a mesh.
 struct MeshExpectation {
   std::optional<int> dimension;
   std::optional<uint64_t> input_points;
@@ -20,10 +20,10 @@ struct MeshExpectation {
 
 // Whether there can be such a mesh.
 //
-// Errors:     DATA_LOSS, naming what is wrong.
+// Errors:     DATA_LOSS, naming the fault.
 absl::Status CheckHeader(const MeshHeader& header, const MeshExpectation& expectation);
 
-// Takes the metadata, then the chunks in their order; what is right goes to a sink at once.
+// Takes the metadata, then the chunks in their order; right ones go to a sink at once.
 //
 // Thread safety: thread-compatible.
 // Invariants: nothing of the mesh is kept.
@@ -37,13 +37,13 @@ class MeshReceiver {
   // The stream broke off, and another follows: the same metadata, then the chunks from next_chunk() on.
   void Continue() { expects_metadata_ = true; }
 
-  // Errors:     DATA_LOSS, naming what is wrong; those of the sink. The stream is to be given up.
+  // Errors:     DATA_LOSS, naming the fault; errors of the sink. The stream is to be given up.
   absl::Status SetMetadata(const v1::MeshMetadata& metadata);
   absl::Status AddChunk(const v1::MeshChunk& chunk);
 
   // To be called once the last stream has ended.
   //
-  // Errors:     DATA_LOSS when something is missing; those of the sink.
+  // Errors:     DATA_LOSS when something is missing; errors of the sink.
   absl::Status Finish();
 
   bool has_metadata() const { return has_metadata_; }
@@ -62,17 +62,18 @@ class MeshReceiver {
     kSimplices,
     kInputVertices,
     kFacets,
+    kRidges,
     kArrays
   };
 
   uint64_t WidthOf(int array) const;
   uint64_t SizeOf(int array) const;  // in numbers
-  // Whether `values` may follow what has come of `array`.
+  // Whether `values` may follow those that have come of `array`.
   absl::Status CheckOrder(Array array, uint64_t values) const;
   absl::Status CheckMoved(const v1::MeshChunk& chunk, uint64_t first) const;
   // Whether the values can be those of the array: vertices that there are, tags and regions that were announced.
   absl::Status CheckValues(Array array, const v1::MeshChunk& chunk) const;
-  // Hands what is right to the sink.
+  // Hands values that were checked to the sink.
   absl::Status Pass(Array array, const v1::MeshChunk& chunk);
 
   MeshSink& sink_;

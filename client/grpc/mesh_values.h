@@ -1,4 +1,4 @@
-// Whether what a server sends can be the values of a mesh. Private to this folder.
+// Checks whether a server's data can be the values of a mesh. Private to this folder.
 #ifndef WELLSPACE_CLIENT_GRPC_MESH_VALUES_H_
 #define WELLSPACE_CLIENT_GRPC_MESH_VALUES_H_
 
@@ -12,7 +12,7 @@
 
 namespace wellspace::client {
 
-// Far above what servers mesh, far below what would make sizes of arrays overflow.
+// Far above the meshes of servers, far below numbers by which sizes of arrays overflow.
 inline constexpr int kMaxDimension = 64;
 
 // The error for an answer that contradicts itself.

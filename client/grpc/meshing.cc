@@ -16,23 +16,41 @@ namespace {
 
 using MeshPointsStream = grpc::ClientReaderWriter<v1::MeshPointsRequest, v1::MeshPointsResponse>;
 
-// Sends segments and faces; false when the call has ended. The rules come even where there is no segment.
-template <typename Request, typename Stream>
-bool UploadFeatures(const Features& features, Request& request, Stream& stream) {
-  for (size_t next = 0; next < features.ends.size() / 2;) {
-    next = FillSegments(features, next, *request.mutable_segments());
+// Sends `rows` rows and `seeds` seeds, each message filled by a function that returns the number after the last; false
+// when the call has ended. The rules come even where there are no rows.
+template <typename Request, typename Stream, typename FillRows, typename FillSeeds>
+bool SendRowsAndSeeds(size_t rows, FillRows fill_rows, size_t seeds, FillSeeds fill_seeds, Request& request,
+                      Stream& stream) {
+  for (size_t next = 0; next < rows;) {
+    next = fill_rows(next);
     if (!stream.Write(request)) {
       return false;
     }
   }
   size_t next = 0;
   do {
-    next = FillFaces(features, next, *request.mutable_faces());
+    next = fill_seeds(next);
     if (!stream.Write(request)) {
       return false;
     }
-  } while (next < features.seeds.size());
+  } while (next < seeds);
   return true;
+}
+
+template <typename Request, typename Stream>
+bool SendFeatures(const Features& features, Request& request, Stream& stream) {
+  return SendRowsAndSeeds(
+      features.ends.size() / 2, [&](size_t next) { return FillSegments(features, next, *request.mutable_segments()); },
+      features.seeds.size(), [&](size_t next) { return FillFaces(features, next, *request.mutable_faces()); }, request,
+      stream);
+}
+
+template <typename Request, typename Stream>
+bool SendFeatures(const SurfaceFeatures& surface, Request& request, Stream& stream) {
+  return SendRowsAndSeeds(
+      surface.corners.size() / 3,
+      [&](size_t next) { return FillTriangles(surface, next, *request.mutable_triangles()); }, surface.seeds.size(),
+      [&](size_t next) { return FillSurface(surface, next, *request.mutable_surface()); }, request, stream);
 }
 
 // The same of sizes at points. They come before the points, so that wrong ones are refused at once.
@@ -69,7 +87,10 @@ void SendCloud(const MeshOptions& options, std::span<const double> points, Reque
     }
     points = points.subspan(chunk.size());
   }
-  if (options.features != nullptr && !UploadFeatures(*options.features, request, stream)) {
+  if (options.features != nullptr && !SendFeatures(*options.features, request, stream)) {
+    return;
+  }
+  if (options.surface != nullptr && !SendFeatures(*options.surface, request, stream)) {
     return;
   }
   stream.WritesDone();

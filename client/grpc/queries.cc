@@ -1,9 +1,14 @@
 // QueryService on the client's side.
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <functional>
+#include <optional>
+#include <string>
+#include <system_error>
 
 #include "absl/strings/str_cat.h"
+#include "client/error_details.h"
 #include "client/grpc/convert.h"
 #include "client/grpc/grpc_connection.h"
 #include "client/grpc/mesh_values.h"
@@ -18,8 +23,12 @@ constexpr size_t kVerticesOfARequest = 1 << 17;
 // Of one request to locate them.
 constexpr size_t kPointsOfARequest = 1 << 14;
 
-// GetServerInfoResponse.max_request_bytes of every server so far.
-constexpr size_t kMostBytesOfARequest = size_t{4} << 20;
+// Of the points of one request to add them, and the vertices near them: three quarters of the least
+// GetServerInfoResponse.max_request_bytes of a server.
+constexpr size_t kBytesOfAnAddition = size_t{3} << 20;
+
+// Of the id of a call that takes several requests; the server's limit is 128, and each but the first has a number more.
+constexpr size_t kMaxLengthOfSharedId = 108;
 
 // A barycentric coordinate is 1 at most, but for rounding.
 constexpr double kMostCoordinate = 1 + 1e-9;
@@ -109,6 +118,75 @@ absl::Status CheckLocated(const v1::LocateRequest& request, size_t count, size_t
   return absl::OkStatus();
 }
 
+// `message` with `first` added to the numbers behind each `what`: the server counts the points of one request.
+std::string WithIndicesFrom(uint64_t first, std::string_view what, std::string message) {
+  for (size_t at = message.find(what); at != std::string::npos; at = message.find(what, at)) {
+    at += what.size();
+    uint64_t index = 0;
+    const std::from_chars_result number = std::from_chars(message.data() + at, message.data() + message.size(), index);
+    if (number.ec == std::errc()) {
+      message.replace(at, number.ptr - message.data() - at, std::to_string(first + index));
+    }
+  }
+  return message;
+}
+
+// The vertices that a call of AddVertices adds, and how far it is.
+struct VertexAddition {
+  // Has it take as many requests as the points need, in a session of `dimension`.
+  absl::Status Divide(int dimension, const CallOptions& call) {
+    const size_t row = std::max(1, dimension);
+    if (points.size() % row != 0 || (!near.empty() && near.size() != points.size() / row)) {
+      return absl::InvalidArgumentError(absl::StrCat("points: ", points.size(), " coordinates with ", near.size(),
+                                                     " vertices near them; expected ", row,
+                                                     " coordinates for each point, and one vertex for each or none"));
+    }
+    if (call.request_id.size() > kMaxLengthOfSharedId) {
+      return absl::InvalidArgumentError(absl::StrCat("request_id has ", call.request_id.size(), " characters; at most ",
+                                                     kMaxLengthOfSharedId,
+                                                     " are accepted for more points than one request has"));
+    }
+    row_of_points = row;
+    row_of_near = near.empty() ? 0 : 1;
+    most = kBytesOfAnAddition / (row * sizeof(double) + sizeof(uint32_t));
+    count = points.size() / row;
+    return absl::OkStatus();
+  }
+
+  v1::AddVerticesRequest NextRequest() const {
+    const size_t now = std::min(most, count - done);
+    const std::span<const double> part = points.subspan(done * row_of_points, now * row_of_points);
+    const std::span<const uint32_t> hints = near.subspan(done * row_of_near, now * row_of_near);
+    v1::AddVerticesRequest request;
+    request.set_name(session);
+    request.mutable_points()->Assign(part.begin(), part.end());
+    request.mutable_near()->Assign(hints.begin(), hints.end());
+    return request;
+  }
+
+  // The error of the next request as that of the call.
+  absl::Status Explain(const absl::Status& status) const {
+    if (done == 0) {
+      return status;
+    }
+    const std::string message =
+        WithIndicesFrom(done, "near[", WithIndicesFrom(done, "points[", std::string(status.message())));
+    return WithMessage(status, absl::StrCat(message, "; the first ", done, " of ", count, " points were added before"));
+  }
+
+  bool IsDone() const { return done >= count; }
+
+  const std::string& session;
+  std::span<const double> points;
+  std::span<const uint32_t> near;
+  // Undivided, all is one row.
+  size_t row_of_points = points.size();
+  size_t row_of_near = near.size();
+  size_t count = 1;
+  size_t most = 1;  // rows of a request
+  size_t done = 0;
+};
+
 template <typename Response>
 std::function<absl::StatusOr<size_t>(const Response&)> HandOn(const OnCells& on_cells) {
   return [&on_cells](const Response& response) -> absl::StatusOr<size_t> {
@@ -166,7 +244,8 @@ absl::Status GrpcConnection::VoronoiCells(const std::string& session, std::span<
 
 absl::StatusOr<Located> GrpcConnection::Locate(const std::string& session, std::span<const double> points,
                                                const LocateOptions& options, const CallOptions& call) {
-  WELLSPACE_ASSIGN_OR_RETURN(const Session found, GetSession(session, call));
+  CallInParts parts(call);
+  WELLSPACE_ASSIGN_OR_RETURN(const Session found, GetSession(session, parts.Next()));
   const size_t dimension = std::max(1, found.parameters.dimension);
   v1::LocateRequest request;
   request.set_name(session);
@@ -182,7 +261,7 @@ absl::StatusOr<Located> GrpcConnection::Locate(const std::string& session, std::
     request.mutable_points()->Assign(part.begin(), part.end());
     request.set_point_offset(done / dimension);
     v1::LocateResponse response;
-    WELLSPACE_RETURN_IF_ERROR(Call(*queries_, &v1::QueryService::Stub::Locate, request, call, &response));
+    WELLSPACE_RETURN_IF_ERROR(Call(*queries_, &v1::QueryService::Stub::Locate, request, parts.Next(), &response));
     WELLSPACE_RETURN_IF_ERROR(CheckLocated(request, part.size() / dimension, dimension, response));
     located.simplices.insert(located.simplices.end(), response.simplices().begin(), response.simplices().end());
     located.vertices.insert(located.vertices.end(), response.vertices().begin(), response.vertices().end());
@@ -196,24 +275,46 @@ absl::StatusOr<Located> GrpcConnection::Locate(const std::string& session, std::
 }
 
 absl::StatusOr<AddedVertices> GrpcConnection::AddVertices(const std::string& session, std::span<const double> points,
-                                                          std::span<const uint32_t> near, const CallOptions& call) {
-  v1::AddVerticesRequest request;
-  request.set_name(session);
-  request.mutable_points()->Assign(points.begin(), points.end());
-  request.mutable_near()->Assign(near.begin(), near.end());
-  request.set_request_id(RequestIdOf(call));
-  SetExpectedRevision(call.expected_revision, request);
-  if (const size_t bytes = request.ByteSizeLong(); bytes > kMostBytesOfARequest) {
-    return absl::InvalidArgumentError(absl::StrCat("points: ", points.size(), " coordinates take ", bytes,
-                                                   " bytes in one request, which has at most ", kMostBytesOfARequest,
-                                                   "; add them in several calls"));
+                                                          std::span<const uint32_t> near, const OnAdded& on_added,
+                                                          const CallOptions& call) {
+  CallInParts parts(call);
+  VertexAddition addition{.session = session, .points = points, .near = near};
+  if (points.size_bytes() + near.size_bytes() > kBytesOfAnAddition) {
+    WELLSPACE_ASSIGN_OR_RETURN(const Session found, GetSession(session, parts.Next()));
+    WELLSPACE_RETURN_IF_ERROR(addition.Divide(found.parameters.dimension, call));
   }
+  const std::string id = RequestIdOf(call);
+  std::optional<uint64_t> expected_revision = call.expected_revision;
+  AddedVertices all;
+  do {
+    v1::AddVerticesRequest request = addition.NextRequest();
+    request.set_request_id(addition.done == 0 ? id : absl::StrCat(id, "/", addition.done));
+    SetExpectedRevision(expected_revision, request);
+    const absl::StatusOr<AddedVertices> added = AddSome(request, parts.Next());
+    if (!added.ok()) {
+      return addition.Explain(added.status());
+    }
+    if (on_added != nullptr) {
+      on_added(*added);
+    }
+    all.vertices.insert(all.vertices.end(), added->vertices.begin(), added->vertices.end());
+    all.revision = added->revision;
+    if (expected_revision.has_value()) {
+      expected_revision = added->revision;
+    }
+    addition.done = std::min(addition.done + addition.most, addition.count);
+  } while (!addition.IsDone());
+  return all;
+}
+
+absl::StatusOr<AddedVertices> GrpcConnection::AddSome(const v1::AddVerticesRequest& request, const CallOptions& call) {
   v1::AddVerticesResponse response;
   WELLSPACE_RETURN_IF_ERROR(Call(*queries_, &v1::QueryService::Stub::AddVertices, request, call, &response));
   const auto count = static_cast<size_t>(response.vertices_size());
-  if (points.empty() ? count != 0
-                     : count == 0 || points.size() % count != 0 || (!near.empty() && count != near.size())) {
-    return Contradiction(count, " vertices for points of ", points.size(), " coordinates");
+  const auto coordinates = static_cast<size_t>(request.points_size());
+  const auto near = static_cast<size_t>(request.near_size());
+  if (coordinates == 0 ? count != 0 : count == 0 || coordinates % count != 0 || (near != 0 && count != near)) {
+    return Contradiction(count, " vertices for points of ", coordinates, " coordinates");
   }
   return AddedVertices{.vertices = {response.vertices().begin(), response.vertices().end()},
                        .revision = response.revision()};

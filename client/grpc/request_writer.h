@@ -11,7 +11,7 @@
 
 namespace wellspace::client {
 
-// What grpc::ClientWriter is, but for one thing: that aborts the process when the answer is no message of its type.
+// A grpc::ClientWriter but for one thing: that aborts the process when the answer is no message of its type.
 //
 // Thread safety: thread-compatible.
 template <typename Request>

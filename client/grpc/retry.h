@@ -77,15 +77,15 @@ class Retrier {
  public:
   explicit Retrier(const RetryPolicy& policy) : policy_(policy) {}
 
-  // Calls `attempt` until it is final, succeeds, fails with what is not worth repeating, or too often; or until
-  // `timeout` has passed.
+  // Calls `attempt` until one is final, succeeds or fails with an error that is not worth repeating; at most as often
+  // as the policy says, and until `timeout` has passed.
   // Errors:     the last attempt's; CANCELLED "cancelled by the caller" when `stop` asked for it.
   absl::Status Run(absl::Duration timeout, const std::stop_token& stop,
                    const std::function<absl::Status(Attempt&)>& attempt);
 
  private:
   const RetryPolicy policy_;
-  std::atomic<bool> reached_{false};
+  std::atomic<bool> reached_{false};  // whether an attempt has reached the server
 };
 
 }  // namespace wellspace::client

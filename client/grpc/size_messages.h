@@ -11,8 +11,8 @@
 namespace wellspace::client {
 
 // Makes `chunk` hold the samples from number `first` on, as many as a message of 1 MiB holds. Returns the
-// number after the last. What has other than `dimension` coordinates for each size goes as it is, in one message: the
-// server refuses it.
+// number after the last. Samples with other than `dimension` coordinates for each size go as they are, in one message:
+// the server refuses them.
 size_t FillSizes(const SizeSamples& samples, int dimension, size_t first, v1::SizeSamples& chunk);
 
 // The same of sizes of vertices.

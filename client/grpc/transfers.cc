@@ -7,7 +7,6 @@
 #include "absl/strings/str_cat.h"
 #include "client/error_details.h"
 #include "client/grpc/convert.h"
-#include "client/grpc/feature_messages.h"
 #include "client/grpc/grpc_connection.h"
 #include "client/grpc/mesh_receiver.h"
 #include "client/grpc/request_writer.h"
@@ -34,7 +33,7 @@ class Upload {
 
   // Reads the first `count` points of the source, or as many as there are, into a checksum. `*count` becomes how many.
   absl::StatusOr<uint32_t> ReadChecked(uint64_t* count);
-  // Sends what is left of the source and half-closes; an error is the source's. Stops early when the call has ended.
+  // Sends the rest of the source and half-closes; an error is the source's. Stops early when the call has ended.
   absl::Status Send(Stream& stream, v1::UploadPointsRequest& request);
 
   PointSource& source_;
@@ -103,7 +102,7 @@ absl::Status Upload::Run(v1::SessionService::Stub& stub, const v1::Session& sess
   if (!offset_.has_value()) {
     offset_ = session.committed_points();
   }
-  // What is there from the offset on has to be of this source: the server compares.
+  // Points from the offset on have to be of this source: the server compares.
   uint64_t first = std::max(*offset_, session.committed_points()) - *offset_;
   const absl::StatusOr<uint32_t> checked = ReadChecked(&first);
   if (!checked.ok()) {
@@ -116,7 +115,7 @@ absl::Status Upload::Run(v1::SessionService::Stub& stub, const v1::Session& sess
   }
   request.set_name(session.name());
   request.set_point_offset(*offset_ + first);
-  // What the attempts before this one committed has changed the revision.
+  // The commits of the attempts before this one have changed the revision.
   SetExpectedRevision(std::exchange(expected_revision_, std::nullopt), request);
   CallContext context(attempt);
   Stream stream(
@@ -139,41 +138,6 @@ absl::Status Upload::Run(v1::SessionService::Stub& stub, const v1::Session& sess
     attempt.SetWorthRepeating();
   }
   return status;
-}
-
-// Segments and seeds of one call of AddSegments, and where they belong.
-struct Addition {
-  const std::string& session;
-  const Features& features;
-  FeatureOffset offset;
-};
-
-// Sends everything and half-closes. Stops early when the call has ended; its status says why.
-void Send(const Addition& addition, const std::optional<uint64_t>& expected_revision,
-          RequestWriter<v1::AddSegmentsRequest>& stream) {
-  v1::AddSegmentsRequest request;
-  request.set_name(addition.session);
-  SetExpectedRevision(expected_revision, request);
-  request.set_seed_offset(addition.offset.seeds);
-  const size_t segments = addition.features.ends.size() / 2;
-  for (size_t next = 0; next < segments;) {
-    request.set_segment_offset(addition.offset.segments + next);
-    next = FillSegments(addition.features, next, *request.mutable_segments());
-    if (!stream.Write(request)) {
-      return;
-    }
-  }
-  request.clear_segments();
-  request.set_segment_offset(addition.offset.segments + segments);
-  size_t next = 0;
-  do {
-    request.set_seed_offset(addition.offset.seeds + next);
-    next = FillFaces(addition.features, next, *request.mutable_faces());
-    if (!stream.Write(request)) {
-      return;
-    }
-  } while (next < addition.features.seeds.size());
-  stream.WritesDone();
 }
 
 // Sends `count` sizes for `session` and half-closes. Stops early when the call has ended; its status says why.
@@ -225,35 +189,6 @@ absl::StatusOr<SizesSet> GrpcConnection::SendAllSizes(const std::string& session
     return status;
   }
   return SizesSet{.size_count = response.size_count(), .revision = response.revision()};
-}
-
-absl::StatusOr<AddedSegments> GrpcConnection::AddSegments(const std::string& session, const Features& features,
-                                                          const std::optional<FeatureOffset>& offset,
-                                                          const CallOptions& call) {
-  std::optional<FeatureOffset> begin = offset;
-  std::optional<uint64_t> expected_revision = call.expected_revision;
-  v1::AddSegmentsResponse response;
-  const absl::Status status = retrier_.Run(call.timeout, call.stop, [&](Attempt& attempt) {
-    if (!begin.has_value()) {
-      const absl::StatusOr<v1::Session> found = FetchSession(session, attempt);
-      if (!found.ok()) {
-        return found.status();
-      }
-      begin = FeatureOffset{.segments = found->segment_count(), .seeds = found->seed_count()};
-    }
-    CallContext context(attempt);
-    RequestWriter<v1::AddSegmentsRequest> stream([&](grpc::CompletionQueue* queue) {
-      return sessions_->PrepareAsyncAddSegments(context.get(), &response, queue);
-    });
-    // What an attempt before this one committed has changed the revision.
-    Send({session, features, *begin}, std::exchange(expected_revision, std::nullopt), stream);
-    return FromGrpcStatus(stream.Finish());
-  });
-  if (!status.ok()) {
-    return status;
-  }
-  return AddedSegments{
-      .segment_count = response.segment_count(), .seed_count = response.seed_count(), .revision = response.revision()};
 }
 
 absl::StatusOr<Uploaded> GrpcConnection::UploadPoints(const std::string& session, PointSource& source,

@@ -1,4 +1,4 @@
-// Meshes that are brought up to date: what has changed where the server knows it, all where it does not.
+// Meshes that are brought up to date: by the changes where the server knows them, as a whole where it does not.
 #include <memory>
 #include <optional>
 #include <utility>
@@ -71,7 +71,7 @@ class Update {
     }
   }
 
-  // Of a stream that has ended with `status`, what the attempt ends with. Differences that are of no use make the
+  // The status for the attempt whose stream has ended with `status`. Differences that are of no use make the
   // update one of the whole mesh.
   absl::Status EndOf(absl::Status status, const absl::Status& damage, bool was_whole, Attempt& attempt) {
     if (was_whole || (is_whole_ && damage.ok() && whole_.has_metadata())) {

@@ -1,6 +1,5 @@
 #include "client/viewer/page.h"
 
-#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -12,9 +11,8 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
 #include "client/formats/vtk/vtk_array.h"
-#include "core/base/status_macros.h"
 
-// The page as it was built, in this program: page_data.cc.
+// The page as it was built, in this program: wellspace_embed.
 extern "C" const char wellspace_viewer_page_begin[];
 extern "C" const char wellspace_viewer_page_end[];
 

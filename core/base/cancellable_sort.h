@@ -50,7 +50,7 @@ absl::Status CancellableSort(std::vector<T>& items, Less less, const RunContext&
   return absl::OkStatus();
 }
 
-// Sorts `items` by key(item), a uint32_t; those with equal keys stay in order. `scratch` is as long.
+// Sorts `items` by key(item), a uint32_t; items with equal keys stay in order. `scratch` is as long.
 //
 // Complexity: O(n).
 // Errors:     as CancellableSort.

@@ -12,7 +12,7 @@ inline constexpr int kMaxDimension = 6;
 // Expands X(D) for every dimension: the explicit instantiations at the end of a source file. Headers declare templates
 // whose definitions only that file has.
 #define WELLSPACE_FOR_EACH_DIMENSION(X) X(2) X(3) WELLSPACE_FOR_EACH_DIMENSION_ABOVE_3(X)
-// The same for what is done otherwise in the plane and in space.
+// As above, for code that differs in the plane and in space.
 #define WELLSPACE_FOR_EACH_DIMENSION_ABOVE_3(X) X(4) X(5) X(6)
 
 #endif  // WELLSPACE_CORE_BASE_DIMENSIONS_H_

@@ -19,7 +19,7 @@ inline constexpr NodeId kNoNode{std::numeric_limits<uint32_t>::max()};
 constexpr uint32_t Index(VertexId id) { return static_cast<uint32_t>(id); }
 constexpr uint32_t Index(NodeId id) { return static_cast<uint32_t>(id); }
 
-// Vertices side by side: those that are listed, or, if none are, those from `first` on.
+// Vertices side by side: the listed ones, or, if none are, the vertices from `first` on.
 struct VertexNames {
   const VertexId* listed = nullptr;
   VertexId first = kNoVertex;

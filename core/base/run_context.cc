@@ -88,7 +88,7 @@ absl::Duration RunContext::TimeIn(Phase phase) const {
   int64_t end = 0;
   for (int later = index + 1; later < kPhaseCount && end == 0; ++later) {
     const int64_t entered = entered_ns_[later].load(std::memory_order_relaxed);
-    end = entered > begin ? entered : 0;  // those before it are of an earlier use of this context
+    end = entered > begin ? entered : 0;  // earlier ones are of an earlier use of this context
   }
   return absl::Nanoseconds((end == 0 ? absl::GetCurrentTimeNanos() : end) - begin);
 }

@@ -1,4 +1,4 @@
-// What a running computation shares with whoever started it: cancellation one way, progress the other.
+// The state that a run shares with its caller: cancellation one way, progress the other.
 #ifndef WELLSPACE_CORE_BASE_RUN_CONTEXT_H_
 #define WELLSPACE_CORE_BASE_RUN_CONTEXT_H_
 
@@ -29,7 +29,7 @@ struct Progress {
   double fraction = 0;              // of the whole run, in [0, 1], never decreasing
 };
 
-// Lends runs their memory. Both calls count what a run holds in all, its input excepted.
+// Lends runs their memory. Both calls count all the memory that a run holds, its input excepted.
 //
 // Thread safety: thread-safe.
 class MemoryLender {
@@ -40,7 +40,7 @@ class MemoryLender {
   // run.
   virtual absl::Status Reserve(uint64_t bytes) = 0;
 
-  // Asked now and then while a run works, with what it holds or is about to. Does not wait; an error ends the run.
+  // Asked now and then while a run works, with the bytes that it holds or is about to. Does not wait; an error ends it.
   virtual absl::Status Allow(uint64_t bytes) = 0;
 };
 
@@ -66,7 +66,7 @@ class RunContext {
 
   Progress Snapshot() const;
 
-  // Who lends the run its memory; null, as at first: nobody does, and it may have all. To be set before the run.
+  // The lender of the run's memory; null, as at first: the run may have all there is. To be set before the run.
   void SetMemoryLender(MemoryLender* lender) { lender_ = lender; }
   bool HasMemoryLender() const { return lender_ != nullptr; }
   absl::Status ReserveMemory(uint64_t bytes) const {

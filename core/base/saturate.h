@@ -12,7 +12,7 @@ inline constexpr double kMostCounted = 0x1p53;
 
 // `count` without its fraction: 0 below 0 and for NaN, kMostCounted above that.
 //
-// A plain cast of what does not fit is undefined behaviour.
+// A plain cast of a number that does not fit is undefined behaviour.
 constexpr uint64_t SaturatedCount(double count) {
   if (!(count > 0)) {
     return 0;

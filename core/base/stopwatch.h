@@ -7,7 +7,7 @@
 
 namespace wellspace::core {
 
-// Adds the time that it lives, less what another clock has counted meanwhile, to a number of seconds.
+// Adds the time that it lives, less the time that another clock has counted meanwhile, to a number of seconds.
 //
 // Thread safety: thread-compatible.
 class Stopwatch {

@@ -34,8 +34,8 @@ class ThreadTeam {
   // In a loop, which of its threads this is, from 0 to threads() - 1.
   static int CurrentThread() { return tbb::this_task_arena::current_thread_index(); }
 
-  // Calls f(i) for each i below `count`, in any order, and returns when all calls have. What was written before is seen
-  // in them, and what they write after.
+  // Calls f(i) for each i below `count`, in any order, and returns when all calls have. All that was written before is
+  // seen in them, and all that they write after.
   template <typename F>
   void ForEach(size_t count, const F& f) {
     Release(&begun_);
@@ -49,7 +49,7 @@ class ThreadTeam {
     });
   }
 
-  // As ForEach, for calls that return an absl::Status: of those that are not ok that of the lowest i is returned. A
+  // As ForEach, for calls that return an absl::Status: of the errors that of the lowest i is returned. A
   // single call is made by the caller.
   template <typename F>
   absl::Status TryForEach(size_t count, const F& f) {
@@ -104,8 +104,8 @@ class ThreadTeam {
   // Whether all calls that have been begun have been made.
   bool HasEnded() const { return ended_calls_ == count_; }
 
-  // Joins in what has been begun, if anything has, and returns when all calls have. If one throws, so does this, and
-  // some are not made.
+  // Joins in the calls that have been begun, if any, and returns when all have been made. If one throws, so does this,
+  // and some are not made.
   void End() {
     if (!std::exchange(has_begun_, false)) {
       return;  // the arena may not even be there
@@ -114,7 +114,7 @@ class ThreadTeam {
     arena_.execute([&] { group_.run_and_wait([this] { Work(); }); });
   }
 
-  // Makes no more of the calls, and returns when those that are made have. What they throw is lost.
+  // Makes no more of the calls, and returns when those that are made have. Their exceptions are lost.
   void Drop() noexcept {
     next_ = count_;
     try {

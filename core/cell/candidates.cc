@@ -16,7 +16,7 @@ namespace {
 constexpr int kNumberBits = 6;
 constexpr size_t kMostRanked = size_t{1} << kNumberBits;
 
-// Which halves of the lanes of a vector are kept, in order.
+// The halves of the lanes of a vector that are kept, in order.
 struct alignas(kLanes * sizeof(double)) Order {
   int32_t halves[8];
 };
@@ -36,7 +36,7 @@ constexpr std::array<Order, 16> kOrders = [] {
   return orders;
 }();
 
-// Writes the lanes of `wide` whose bit in `kept` is set to `column`, from `at` on, in order. What follows there is
+// Writes the lanes of `wide` whose bit in `kept` is set to `column`, from `at` on, in order. Later values there are
 // lost.
 template <size_t kWidth>
 WELLSPACE_INLINE void Compress(const typename Wide<kWidth>::Mask& wide, uint32_t kept, void* column, size_t at) {
@@ -103,7 +103,7 @@ WELLSPACE_INLINE void PickThose(std::span<const Point<D>> positions, const Point
 template <int D, size_t kWidth>
 WELLSPACE_INLINE void DropThose(size_t begin, Candidates<D>& all) {
   using Mask = typename Wide<kWidth>::Mask;
-  const size_t first = begin / kWidth * kWidth;  // what is before begin stays
+  const size_t first = begin / kWidth * kWidth;  // lanes before begin stay
   uint32_t done = (1u << (begin - first)) - 1;
   size_t count = first;
   for (size_t from = first; from < all.count; from += kWidth) {
@@ -123,8 +123,8 @@ WELLSPACE_INLINE void DropThose(size_t begin, Candidates<D>& all) {
   all.count = count;
 }
 
-// Moves candidate i to the place `places[i]`. By four, since the end of the loop is predicted better then: what is not
-// a candidate has the place after the last.
+// Moves candidate i to the place `places[i]`. By four, since the end of the loop is predicted better then: lanes
+// without a candidate have the place after the last.
 template <int D>
 WELLSPACE_INLINE void Scatter(const Candidates<D>& from, const uint32_t* places, Candidates<D>& to) {
   for (size_t first = 0; first < from.count; first += kLanes) {

@@ -1,8 +1,8 @@
-// The contract of a cell: what Polygon (2-D), Polyhedron (3-D) and Polytope (4-D to 6-D) all promise. Their headers say
-// only what is their own. docs/design/cell.md has the folder's story, and which file answers which question.
+// The contract of a cell: the promises of Polygon (2-D), Polyhedron (3-D) and Polytope (4-D to 6-D). Their headers have
+// their own alone. docs/design/cell.md has the folder's story, and which file answers which question.
 //
-// A cell is the part of a box that is nearer to its site than to each vertex that it was cut by. In what state it is
-// says what its nodes() are:
+// A cell is the part of a box that is nearer to its site than to each vertex that it was cut by. Its state decides the
+// meaning of its nodes():
 //
 //   state    after                                           nodes()
 //   cut      Reset, CutBeforePlace, CutByEach                may not be asked for
@@ -12,8 +12,8 @@
 //
 // All else may be asked in every state. A caller may rely on this, whichever the class:
 //
-//   1. Whether a vertex cuts, and which nodes there are, as sets of planes, is what exact arithmetic and the tie rule
-//      say. Rounding may cost time, and never changes the answer.
+//   1. Exact arithmetic and the tie rule decide whether a vertex cuts, and which nodes there are, as sets of planes.
+//      Rounding may cost time, and never changes the answer.
 //   2. Once placed, a cell is the same to the bit whatever the order of its cuts, and by every vector unit; only the
 //      numbers of its nodes and planes differ. With TieRule::kKeep so are positions, while nodes that coincide may be
 //      joined otherwise.
@@ -22,9 +22,9 @@
 //   4. Nothing is allocated once the cell is warm: Reset keeps the arrays of the cell before.
 //   5. A cell may be used by one thread at a time; two cells share nothing.
 //
-// What differs, and why:
+// The differences, and why:
 //
-//   what                        Polygon, Polyhedron                      Polytope
+//   property                    Polygon, Polyhedron                      Polytope
 //   nodes while cut             floats, eight a vector; one bound for    doubles, four a vector; a slack each, since
 //                               all, since they come from planes         new nodes come from nodes before them
 //   Tighten                     does nothing: a cut brings reach_sq()    finds the farthest node, which a cut leaves
@@ -53,7 +53,7 @@
 
 namespace wellspace::core {
 
-// What may be asked of a cell that does not change.
+// The questions to a cell that does not change.
 template <typename C, int D>
 concept CellToRead = requires(const C& cell, double ratio, const Box<D>& cube, int index, const CellNode<D>& node,
                               Star<D>& star) {
@@ -100,7 +100,7 @@ concept CellToRead = requires(const C& cell, double ratio, const Box<D>& cube, i
   { cell.cuts() } -> std::same_as<uint64_t>;
   // How many nodes were decided on exactly since Reset.
   { cell.counters() } -> std::same_as<const DecisionCounters&>;
-  // What the cell takes in memory, roughly, but for itself.
+  // The memory of the cell, roughly, but for itself.
   { cell.MemoryBytes() } -> std::same_as<uint64_t>;
 };
 
@@ -110,7 +110,7 @@ concept CellClass = std::default_initializable<C> && CellToRead<C, D> &&
     requires(C& cell, const Point<D>& point, const Box<D>& bounds, const std::array<PlaneKind, 2 * D>& kinds,
              TieRule rule, VertexId vertex, std::span<const Point<D>> points, const VertexNames& names, double ratio) {
   // Begins with the box `bounds`, which holds the site `point` and whose faces are of kind `kinds[FaceIndex]`. `rule`
-  // says what becomes of nodes that lie exactly on a bisector.
+  // decides ties: nodes that lie exactly on a bisector.
   //
   // Complexity: O(2^D); no allocation once warm.
   // Errors:     none.
@@ -127,10 +127,10 @@ concept CellClass = std::default_initializable<C> && CellToRead<C, D> &&
   // Source:     the cell as a simple polytope is usual since Tanemura, Ogawa and Ogita 1983.
   { cell.Cut(vertex, point) } -> std::same_as<bool>;
 
-  // The same where more cuts may follow: the nodes are not placed.
+  // Cuts like Cut where more cuts may follow: the nodes are not placed.
   { cell.CutBeforePlace(vertex, point) } -> std::same_as<bool>;
 
-  // The same by the vertices at `points`, called `names`, as many as a leaf holds at most; the nearest first, since far
+  // Cuts so by the vertices at `points`, called `names`, as many as a leaf holds at most; the nearest first, since far
   // ones then seldom cut. The cell's own, `vertex`, may be among them. Returns how many others are within reach. Ends
   // early once IsTooLarge().
   //
@@ -140,7 +140,7 @@ concept CellClass = std::default_initializable<C> && CellToRead<C, D> &&
   // Errors:     none.
   { cell.CutByEach(points, names, vertex) } -> std::same_as<size_t>;
 
-  // Computes what nodes() tells, from the planes of each node alone, so that it does not depend on the order of the
+  // Computes the result of nodes() from the planes of each node alone, so that it does not depend on the order of the
   // cuts. Nothing is left to do if the cell is placed.
   //
   // Complexity: O(nodes); in 3-D O(nodes log nodes) with more than 64 planes. No allocation once warm.
@@ -154,7 +154,7 @@ concept CellClass = std::default_initializable<C> && CellToRead<C, D> &&
   // Errors:     none.
   { cell.PlaceUnlessKeeps(ratio) } -> std::same_as<bool>;
 
-  // Brings reach_sq() down to what it is since the last cut.
+  // Lowers the bound reach_sq() to the nodes that the last cut has left.
   //
   // Complexity: O(nodes).
   // Errors:     none.

@@ -1,5 +1,5 @@
-// What a Polygon and a Polyhedron do alike with the vector unit that there is: be cut by many vertices, and tell what
-// they reach. For polygon.cc and polyhedron.cc alone, into which all is compiled.
+// The common work of Polygon and Polyhedron with the vector unit that there is: cuts by many vertices, and tests of a
+// cell's reach. For polygon.cc and polyhedron.cc alone, into which all is compiled.
 #ifndef WELLSPACE_CORE_CELL_CELL_ON_UNIT_H_
 #define WELLSPACE_CORE_CELL_CELL_ON_UNIT_H_
 
@@ -26,8 +26,8 @@ namespace wellspace::core {
 // `Cell` has the dimension D, and is a FloatCell<D> that this is a friend of. It has groups(), which has the nodes, and
 // CutOff<kUnit>(bisector, u, position), which cuts by one vertex.
 //
-// Each function chooses the unit once. What it calls is made for that unit, and inlined: a call in between would leave
-// the vectors of AVX2.
+// Each function chooses the unit once. The functions below it are made for that unit, and inlined: a call in between
+// would leave the vectors of AVX2.
 template <typename Cell, int D>
 struct CellOnUnit {
   // As CellClass has CutBeforePlace.
@@ -60,8 +60,8 @@ struct CellOnUnit {
   }
 
  private:
-  // By up to kMostCutTogether vertices, ContiguousVertices or ChosenVertices: picks those that may cut, and cuts by
-  // them, the nearest first. Returns how many but the site are within reach.
+  // Cuts by up to kMostCutTogether vertices, ContiguousVertices or ChosenVertices: picks those that may cut, and cuts
+  // by them, the nearest first. Returns how many but the site are within reach.
   template <VectorUnit kUnit, typename Vertices>
   WELLSPACE_INLINE static size_t CutByVertices(Cell& cell, const Vertices& vertices, VertexId site) {
     FloatCandidates<D> candidates;
@@ -83,8 +83,8 @@ struct CellOnUnit {
     return candidates.within_reach;
   }
 
-  // By the gathered vertices that are within the cell's reach: the near ones, after which the reach is mostly final,
-  // then those between them and the reach, as often as it takes. Up to kMostCutTogether at a time.
+  // Cuts by the gathered vertices that are within the cell's reach: the near ones, after which the reach is mostly
+  // final, then those between them and the reach, as often as it takes. Up to kMostCutTogether at a time.
   template <VectorUnit kUnit>
   WELLSPACE_INLINE static size_t CutByGatheredWith(Cell& cell, const GatheredVertices<D>& gathered, VertexId site) {
     alignas(sizeof(FloatMask)) int32_t numbers[GatheredVertices<D>::kMost + kFloatLanes];

@@ -1,4 +1,4 @@
-// What the Voronoi cell of one vertex is made of, whichever class it is: planes, and nodes where these meet.
+// The parts of the Voronoi cell of one vertex, whichever class it is: planes, and nodes where these meet.
 #ifndef WELLSPACE_CORE_CELL_CELL_PARTS_H_
 #define WELLSPACE_CORE_CELL_CELL_PARTS_H_
 
@@ -18,15 +18,15 @@
 
 namespace wellspace::core {
 
-// What a bounding plane of a cell is. Those that are no bisectors are its walls, at right angles to an axis.
+// The kinds of bounding planes of a cell. Planes that are no bisectors are its walls, at right angles to an axis.
 enum class PlaneKind : uint8_t {
   kBisector,
   kFace,  // of the box
   kClip,  // of the box that a clipped cell is computed in, or of the walls far outside the box
 };
 
-// What a cell clipped by the box `clip` begins with: what `box` has in common with that. `kinds` says by FaceIndex what
-// its faces are.
+// The first shape of a cell clipped by the box `clip`: the part of `box` in it. `kinds` gets the kind of each face, by
+// FaceIndex.
 template <int D>
 Box<D> ClippedBox(const Box<D>& box, const Box<D>& clip, std::array<PlaneKind, 2 * D>& kinds) {
   Box<D> bounds = box;
@@ -53,7 +53,7 @@ struct Plane {
   double offset = 0;
   double length = 0;      // |normal|
   double distance = 0;    // of the plane from the site, |offset| / length
-  PlaneSource<D> source;  // what exact decisions take, in the coordinates of the input; the rest is rounded
+  PlaneSource<D> source;  // for exact decisions, in the coordinates of the input; the rest is rounded
 };
 
 // Makes `plane` the wall on face `face` of `bounds`.
@@ -136,17 +136,17 @@ FaceMask FacesOf(std::span<const Plane<D>> planes, const CellNode<D>& node) {
   return faces;
 }
 
-// So many vertices at most cut a cell in one go, in the plane and in space.
+// The most vertices that cut a cell in one go, in the plane and in space.
 inline constexpr size_t kMostCutTogether = 64;
 
-// What a cell is cut to at most, so that its parts can be numbered and a cut ends soon. Cells of a refined mesh are
+// The most parts of a cell, so that its parts can be numbered and a cut ends soon. Cells of a refined mesh are
 // far smaller; a vertex amid unrefined ones can have all of them for neighbours.
 template <int D>
 inline constexpr size_t kMostNodes = D <= 4 ? size_t{1} << 14 : size_t{1} << 18;
 inline constexpr size_t kMostPlanes = size_t{1} << 15;
 
 // A vertex whose squared distance from the site, as computed, is more than so many times the squared reach of a cell
-// cannot cut it: its bisector is half as far. What is over 4 is for rounding.
+// cannot cut it: its bisector is half as far. The part over 4 is for rounding.
 inline constexpr double kCutLimit = 4 * (1 + 0x1p-49);
 
 // Ends the program unless `holds`: something that must be true of the graph of a cell after a cut. Exact decisions take

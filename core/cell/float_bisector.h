@@ -17,9 +17,9 @@ template <int D>
 struct FloatBisector {
   float w[D];          // the vector to the vertex
   float offset;        // |w|^2 / 2
-  float least_offset;  // the offset, less by what an excess over it may be wrong by at most (kExcessError)
+  float least_offset;  // the offset, less the bound on the error of an excess over it (kExcessError)
 
-  // Of the vertex at `normal` from the site, in the units of the input, for a cell whose nodes are within
+  // The bisector of the vertex at `normal` from the site, in the units of the input, for a cell whose nodes are within
   // `radius_bound`.
   WELLSPACE_INLINE static FloatBisector Of(const Point<D>& normal, double scale, float radius_bound) {
     FloatBisector bisector;

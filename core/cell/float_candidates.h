@@ -63,7 +63,7 @@ struct alignas(sizeof(Floats)) FloatCandidates {
       is_near &= ~vertices.template AreNamed<kUnit>(site_name, from);
       within_reach += static_cast<size_t>(std::popcount(Bits<kUnit>(is_near)));
       may_cut(vectors, least_offsets, is_near);
-      // Those that are left are appended to each column, by one shuffle that moves them to the front.
+      // The candidates that are left are appended to each column, by one shuffle that moves them to the front.
       const uint32_t kept = Bits<kUnit>(is_near);
       const FloatMask lanes = OrderOf<kUnit>(kept);
       const auto append = [&](const auto& items, auto* column) __attribute__((always_inline)) {
@@ -102,7 +102,7 @@ struct alignas(sizeof(Floats)) FloatCandidates {
         break;
       }
       if (cut(bisector, static_cast<size_t>(slot[i]))) {
-        left = offset_bound() * (1 + 0x1p-16f);  // those that follow may be nearer by as much
+        left = offset_bound() * (1 + 0x1p-16f);  // later candidates may be nearer by as much
       }
     }
   }
@@ -133,7 +133,7 @@ struct alignas(sizeof(Floats)) FloatCandidates {
         }
       }
       for (size_t lane = 0; lane < kFloatLanes; ++lane) {
-        order[before[lane]] = static_cast<uint32_t>(first + lane);  // of what is none: after the last
+        order[before[lane]] = static_cast<uint32_t>(first + lane);  // lanes without a candidate: after the last
       }
     }
   }

@@ -1,4 +1,4 @@
-// What cells that are cut in floats have in common, in the plane and in space.
+// The common part of cells that are cut in floats, in the plane and in space.
 #ifndef WELLSPACE_CORE_CELL_FLOAT_CELL_H_
 #define WELLSPACE_CORE_CELL_FLOAT_CELL_H_
 
@@ -35,7 +35,7 @@ struct CellOnUnit;
 template <int D>
 class FloatCell {
  public:
-  // So many nodes are worked on together: those of a Group.
+  // The number of nodes that are worked on together: a Group's.
   static constexpr size_t kGroupSize = kFloatLanes;
 
   bool IsTooLarge() const { return count_ > kMostNodes<D> || plane_count_ > kMostPlanes; }
@@ -124,7 +124,7 @@ class FloatCell {
   std::vector<Plane<D>> planes_;  // by plane, plane_count_ of them: walls by FaceIndex, then bisectors as they cut
   size_t plane_count_ = 0;
   bool is_placed_ = false;          // all nodes are
-  std::vector<CellNode<D>> nodes_;  // by node: what nodes() tells
+  std::vector<CellNode<D>> nodes_;  // by node: the result of nodes()
   uint64_t cuts_ = 0;
   DecisionCounters counters_;
 };

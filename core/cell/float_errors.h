@@ -1,9 +1,9 @@
-// By how much what is computed of a cell in floats may be wrong, in the plane and in space: every bound, and its
+// The errors of a cell that is computed in floats, in the plane and in space: the bound on each error, and its
 // derivation. u = 2^-24 is the unit of rounding of floats; x are nodes, w a vector to a vertex, R bounds the distance
 // of all nodes; lengths are in the units of the nodes (float_cell.h). A bound per node would cost a column; one for all
-// is looser, and what it leaves in doubt goes to NodeDoubtSq, and then to DecideCut.
+// is looser, and nodes that it leaves in doubt go to NodeDoubtSq, and then to DecideCut.
 //
-//   what is wrong                  bound            2-D     3-D     times     used by
+//   error of                       bound            2-D     3-D     times     used by
 //   a node                         kNodeError       1.5 u   16 u    |x|       all below
 //   an excess x . w - |w|^2 / 2    kExcessError     16 u    32 u    R |w|     FloatBisector: which nodes are cut off
 //   the same of one node           NodeDoubtSq      1.5 u   16 u    |x| |w|   DecideDoubtful, before DecideCut
@@ -25,11 +25,11 @@ inline constexpr float kNodeError = D == 2 ? 1.5f : 16;
 // With R at least the distance of the nodes, an excess x . w - |w|^2 / 2 is wrong by at most u ((kNodeError + D + 2) R
 // |w| + (2 D + 2) |w|^2 / 2): w is by u |w|; the products by u |x| |w| together, the D sums by D u (|x| |w| + |w|^2 /
 // 2), and |w|^2 / 2 by (D + 2) u of itself. A vertex that may cut has
-// |w| <= 2 R, so that all is less than 12 u R |w| in 2-D, 29 u R |w| in 3-D; one u more for what is taken off |w|^2 /
+// |w| <= 2 R, so that all is less than 12 u R |w| in 2-D, 29 u R |w| in 3-D; one u more for the part taken off |w|^2 /
 // 2.
 template <int D>
 inline constexpr float kExcessError = D == 2 ? 0x1p-20f : 0x1p-19f;
-// What squares of distances can lose below the least float, and more: nothing that a cell is made of is as small.
+// The loss of squares of distances below the least float, and more: nothing that a cell is made of is as small.
 inline constexpr float kUnderflow = 0x1p-80f;
 // A distance differs by less than this share of itself from that of the exact node, a square by less than twice as
 // much.
@@ -47,8 +47,8 @@ inline float SurelyKeptRatioSq(double ratio) {
   return static_cast<float>(surely * surely);
 }
 
-// The square of what the excess of the node x, as computed in doubles, over the bisector to a vertex at that squared
-// distance may be wrong by: the error of the node itself times |w|, and a hundredth for what doubles add.
+// The squared bound on the error of the excess of the node x, in doubles, over the bisector to a vertex at that squared
+// distance: the error of the node itself times |w|, and a hundredth more for the rounding of doubles.
 template <int D>
 double NodeDoubtSq(const Point<D>& x, double length_sq) {
   constexpr double kShare = 1.01 * 0x1p-24 * kNodeError<D>;

@@ -1,4 +1,4 @@
-// What is asked of all nodes of a cell in floats, eight at a time. `Group` is Polygon::Group or Polyhedron::Group:
+// Questions to all nodes of a cell in floats, eight at a time. `Group` is Polygon::Group or Polyhedron::Group:
 // lanes beyond the last node are at the site, and so never decide. For polygon.cc and polyhedron.cc, into which all is
 // compiled.
 #ifndef WELLSPACE_CORE_CELL_FLOAT_NODES_H_

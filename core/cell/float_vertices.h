@@ -66,7 +66,7 @@ struct ContiguousVertices {
   WELLSPACE_INLINE void FindVectors(size_t i, const Point<D>& site, double scale, Floats* w) const {
     VectorsTo(&positions[i], site, scale, w);
   }
-  // Which of them are called that.
+  // The lanes of vertices from the i-th on that have this name.
   template <VectorUnit kUnit>
   WELLSPACE_INLINE FloatMask AreNamed(VertexId name, size_t i) const {
     FloatMask listed{};
@@ -78,7 +78,7 @@ struct ContiguousVertices {
   }
 };
 
-// Some of those that have been gathered, by number; beyond the last there are seven more numbers of any.
+// Some of the gathered vertices, by number; beyond the last there are seven more numbers of any.
 template <int D>
 struct ChosenVertices {
   const GatheredVertices<D>& gathered;

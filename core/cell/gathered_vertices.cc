@@ -11,15 +11,15 @@ namespace {
 constexpr size_t kFewestSites = 8;
 // Vertices in two leaves side by side, along each axis, so that they are worked on together.
 constexpr size_t kMostInTwo = 128;
-// In mean distances between vertices that are neighbours. Those within this distance of the sites are gathered, which
-// matter to nearly all cells.
+// In mean distances between vertices that are neighbours. Vertices within this distance of the sites are gathered,
+// which matter to nearly all cells.
 constexpr double kWithin = 2.8;
-// Those within this distance of a site, which cut most, are looked at before all others.
+// Vertices within this distance of a site, which cut most, are looked at before all others.
 constexpr double kNear = 2.1;
 
 }  // namespace
 
-// As many of the sites, from the first on, as lie in a box no longer than a leaf, or two; `spacing` is the mean
+// Takes as many sites, from the first on, as lie in a box no longer than a leaf, or two; `spacing` is the mean
 // distance of vertices in their leaves.
 template <int D>
 typename GatheredVertices<D>::SitesTogether GatheredVertices<D>::TakeSites(const LeafTree<D>& tree,
@@ -128,7 +128,7 @@ WELLSPACE_INLINE double GatheredVertices<D>::NearestSqWith(VertexId v, const Poi
   ForEachDistanceSq<D>(
       *this, site, [&](size_t i, const Floats& distance_sq) __attribute__((always_inline)) {
         *reinterpret_cast<Floats*>(distances_sq + i) = distance_sq;
-        const FloatMask counts = IsLess<kUnit>(Floats{}, distance_sq);  // but for v, and what is too near to tell
+        const FloatMask counts = IsLess<kUnit>(Floats{}, distance_sq);  // but for v, and vertices too near to tell
         least = Min<kUnit>(least, Choose<kUnit>(counts, distance_sq, Splat(kInfinity)));
       });
   const double nearest = std::sqrt(double{-Largest<kUnit>(-least)}) + 2 * kColumnError;

@@ -1,4 +1,4 @@
-// The vertices around some sites, side by side: what the cells of these are cut by without a walk from leaf to leaf.
+// The vertices around some sites, side by side: their cells are cut by these without a walk from leaf to leaf.
 #ifndef WELLSPACE_CORE_CELL_GATHERED_VERTICES_H_
 #define WELLSPACE_CORE_CELL_GATHERED_VERTICES_H_
 
@@ -29,7 +29,7 @@ class GatheredVertices {
   // Columns of more would not stay in the first cache.
   static constexpr size_t kMost = 1024;
 
-  // Gathers the vertices around the first of `sites`, and returns how many sites these are: those as near each other as
+  // Gathers the vertices around the first of `sites`, and returns how many sites these are: sites as near each other as
   // in a leaf, or in two side by side. None are gathered if it would not pay: for few sites, and for those amid more
   // than kMost. `points` are by vertex, in the leaves of `tree`; `seen`, by node of the tree, is set to `mark`, which
   // it has nowhere before, where a leaf has been met.
@@ -61,8 +61,8 @@ class GatheredVertices {
     return reach * reach;
   }
 
-  // Of the gathered vertices other than `v`, which is at `site` and surrounded, the nearest one's squared distance;
-  // infinite if there is no other.
+  // The squared distance of the nearest gathered vertex other than `v`, which is at `site` and surrounded; infinite if
+  // there is no other.
   //
   // Complexity: O(count()), little for each.
   // Errors:     none.
@@ -72,11 +72,11 @@ class GatheredVertices {
   size_t leaf_count() const { return leaves_.size(); }
   const Point<D>& position(size_t i) const { return positions_[i]; }
   VertexId name(size_t i) const { return names_[i]; }
-  // May be read by eight; beyond the last is what is no number, and thus no nearer than anything.
+  // May be read by eight; beyond the last are NaNs, which are no nearer than anything.
   const float* column(int axis) const { return columns_[axis].data(); }
-  // What the column of an axis has of `p`, in units of about the width of all.
+  // The value for `p` in the column of an axis, in units of about the width of all.
   float InColumn(const Point<D>& p, int axis) const { return static_cast<float>((p[axis] - center_[axis]) * scale_); }
-  // What the square of a distance is at most, as computed from columns, if this is that of the vertices.
+  // The largest square of a distance, as computed from columns, if this is that of the vertices.
   float MostSq(double distance_sq) const {
     const double most = std::sqrt(distance_sq) * scale_ + kColumnError;
     return static_cast<float>(most * most);
@@ -85,7 +85,7 @@ class GatheredVertices {
   double near_sq() const { return near_sq_; }
 
  private:
-  // What a distance computed from columns may be wrong by: each of the coordinates, below 2, by 2^-24; their difference
+  // The error of a distance computed from columns: each of the coordinates, below 2, by 2^-24; their difference
   // by three times that; so the length, below 4, in up to three dimensions by (3 sqrt(3) + 7) 2^-24.
   static constexpr double kColumnError = 0x1p-20;
 

@@ -1,7 +1,7 @@
-// Where D planes meet, in doubles, and how far that may be from where they meet exactly: what Place computes for each
+// Where D planes meet, in doubles, and how far that may be from where they meet exactly: Place computes it for each
 // node.
 //
-//   PlaceNode, PlaceByPlanes   what cells call: Meet, or ExactMeetingPoint where its bound is not good enough
+//   PlaceNode, PlaceByPlanes   called by cells: Meet, or ExactMeetingPoint where its bound is not good enough
 //   Meet                       D <= 3 by Cramer's rule, D > 3 by an approximate inverse; the bound is derived there
 //   MeetInSpace                Meet in 3-D, also of four nodes side by side (Polyhedron::PlaceTogether)
 //
@@ -248,8 +248,8 @@ Placement<D> Meet(const std::array<const Plane<D>*, D>& planes) requires(D > 3) 
 // slack |w|.
 inline constexpr double kProductError = 16 * kUnit;
 
-// A placed node is wrong by at most this share of its distance from the site. What is sure of nodes by twice as much
-// does not depend on how they were placed.
+// A placed node is wrong by at most this share of its distance from the site. A decision on nodes with twice as much to
+// spare does not depend on how they were placed.
 inline constexpr double kPlacedError = 0x1p-20;
 
 // Computes where planes of a cell, in their order, meet, exactly where they are too nearly dependent for doubles, and
@@ -273,7 +273,7 @@ double PlaceByPlanes(const Point<D>& site, const std::array<const Plane<D>*, D>&
   return placed.error + kProductError * placed.radius;
 }
 
-// The same for those of the planes of a cell that have these indices.
+// PlaceByPlanes for those of the planes of a cell that have these indices.
 template <int D>
 double PlaceByPlanes(const Point<D>& site, std::span<const Plane<D>> planes, const std::array<uint16_t, D>& indices,
                      Point<D>& x) {

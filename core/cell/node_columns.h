@@ -1,5 +1,5 @@
-// The positions of a cell's nodes from 4-D on, four side by side, and what is asked of all of them: excesses over a
-// bisector, bounds on those over many, what they reach, the farthest.
+// The positions of a cell's nodes from 4-D on, four side by side, and the queries of all of them: excesses over a
+// bisector, bounds on the excesses over many, the reach, the farthest node.
 #ifndef WELLSPACE_CORE_CELL_NODE_COLUMNS_H_
 #define WELLSPACE_CORE_CELL_NODE_COLUMNS_H_
 
@@ -28,7 +28,7 @@ class NodeColumns {
     double x[D][kLanes];
     double slack[kLanes];
   };
-  // The coordinates of a node, then its slack, then what means nothing.
+  // The coordinates of a node, then its slack, then padding.
   struct alignas(kLanes * sizeof(double)) Row {
     double values[PaddedCount(D + 1)];
   };
@@ -79,8 +79,8 @@ class NodeColumns {
   WELLSPACE_INLINE bool ComputeExcesses(const Point<D>& normal, double offset, double length, double error);
   std::span<const double> excesses() const { return {excesses_.front().values, count_}; }
 
-  // What the last ComputeExcesses found: bit b of word w stands for node kWordBits w + b. Nodes of `maybe` that are not
-  // of `surely` are in doubt.
+  // The findings of the last ComputeExcesses: bit b of word w stands for node kWordBits w + b. Nodes of `maybe` that
+  // are not of `surely` are in doubt.
   struct Found {
     uint64_t maybe = 0;
     uint64_t surely = 0;

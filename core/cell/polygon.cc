@@ -41,8 +41,8 @@ Point<2> Polygon::PositionOf(size_t node) const {
   return {group.x[0][node % kGroupSize], group.x[1][node % kGroupSize]};
 }
 
-// Of the nodes `first` + i for the bits i of `doubtful`: a bit for whether it is cut off, by its own error if that
-// tells, else exactly.
+// Decides the nodes `first` + i for the bits i of `doubtful`, by their own errors if those tell, else exactly. Returns
+// the bits of nodes that are cut off.
 [[gnu::noinline]] uint32_t Polygon::DecideDoubtful(size_t first, uint32_t doubtful, const Point<2>& generator) {
   const Point<2> w = ScaledTo(generator);
   const double length_sq = NormSq<2>(w);
@@ -130,7 +130,7 @@ WELLSPACE_INLINE void Polygon::Replace(const KeptRun& run, const std::array<Node
   SetReach(Largest<kUnit>(RadiiSq<2>(group)));
 }
 
-// The same for any number of nodes, one by one.
+// Replace for any number of nodes, one by one.
 [[gnu::noinline]] void Polygon::ReplaceAmongMany(const KeptRun& run, const std::array<Node, 2>& ends) {
   reordered_.clear();
   for (size_t j = 0; j < run.count; ++j) {
@@ -166,8 +166,8 @@ WELLSPACE_INLINE Floats Polygon::BoundExcesses(const FloatBisector<2>& bisector)
   return Load(group.x[0]) * bisector.w[0] + (Load(group.x[1]) * bisector.w[1] - bisector.least_offset);
 }
 
-// Tells what the bisector leaves of the nodes, kGroupSize or fewer, of which those of the bits `maybe` may be beyond
-// it; false if all.
+// Finds the nodes that the bisector leaves, of kGroupSize or fewer. The nodes of the bits `maybe` may be beyond it.
+// False if none is.
 template <VectorUnit kUnit>
 WELLSPACE_INLINE bool Polygon::FindKept(const FloatBisector<2>& bisector, const Floats& excess_bounds, uint32_t maybe,
                                         const Point<2>& position, KeptRun& run) {
@@ -182,7 +182,7 @@ WELLSPACE_INLINE bool Polygon::FindKept(const FloatBisector<2>& bisector, const 
   }
   const uint32_t is_before = removed << 1 | removed >> (count - 1);  // by node, whether the one before it goes
   const uint32_t first = is_before & ~removed & ((1u << count) - 1);
-  // What a line cuts off a convex polygon is one run of nodes, and decisions are exact: so one node that stays comes
+  // A line cuts one run of nodes off a convex polygon, and decisions are exact: so one node that stays comes
   // after one that goes, unless all go, which the site's side of the bisector forbids.
   AbortUnlessCellHolds(std::has_single_bit(first));
   run.first = static_cast<uint32_t>(std::countr_zero(first));
@@ -190,7 +190,7 @@ WELLSPACE_INLINE bool Polygon::FindKept(const FloatBisector<2>& bisector, const 
   return true;
 }
 
-// The same of any number of nodes, one by one.
+// FindKept for any number of nodes, one by one.
 [[gnu::noinline]] bool Polygon::FindKeptOfMany(const FloatBisector<2>& bisector, const Point<2>& position,
                                                KeptRun& run) {
   is_removed_.assign(count_, 0);

@@ -1,4 +1,4 @@
-// The Voronoi cell of one vertex in the plane under construction: Polytope<2>. What its functions promise is said in
+// The Voronoi cell of one vertex in the plane under construction: Polytope<2>. The promises of its functions are in
 // cell_class.h.
 #ifndef WELLSPACE_CORE_CELL_POLYGON_H_
 #define WELLSPACE_CORE_CELL_POLYGON_H_
@@ -23,14 +23,14 @@
 namespace wellspace::core {
 
 // The cell in the plane: a convex polygon, whose nodes are kept in order around the site, counter-clockwise, so that a
-// cut takes a run of them out and puts two in. What floats leave in doubt is decided exactly.
+// cut takes a run of them out and puts two in. Doubts that floats leave are decided exactly.
 //
 //   BoundExcesses, FindKept   which run of nodes the bisector leaves; in doubt by DecideDoubtful
 //   AddBisector               the new plane (float_cell.h)
 //   PlaceEnds                 where the new plane meets the two edges that the run ends at
 //   Replace                   the run and the two ends become the nodes, and the farthest one the reach
 //
-// Up to eight nodes, as most cells have, are worked on as one vector; those with more, one by one (FindKeptOfMany,
+// Up to eight nodes, as most cells have, are worked on as one vector; more nodes, one by one (FindKeptOfMany,
 // ReplaceAmongMany).
 //
 // Thread safety: thread-compatible. Reused from site to site: no allocation once warm.
@@ -78,8 +78,8 @@ class Polygon : public FloatCell<2> {
  private:
   friend struct CellOnUnit<Polygon, 2>;
 
-  // What is computed of kGroupSize nodes at a time, in the units of the nodes. Lanes beyond the last node are at the
-  // site, which no bisector cuts off.
+  // The values computed for kGroupSize nodes at a time, in the units of the nodes. Lanes beyond the last node are at
+  // the site, which no bisector cuts off.
   struct alignas(kGroupSize * sizeof(float)) Group {
     float x[2][kGroupSize];
     float edge_sq[kGroupSize];  // the squared length of the edge from the site to the vertex of `plane`; 0 of a wall

@@ -19,7 +19,7 @@ using FourFloats = float __attribute__((vector_size(16)));
 
 }  // namespace
 
-// Brings the reach down to what the nodes tell.
+// Lowers the bound on the reach to the distance of the farthest node.
 template <VectorUnit kUnit>
 WELLSPACE_INLINE void Polyhedron::SetReach() {
   Floats most_sq{};
@@ -113,8 +113,8 @@ WELLSPACE_INLINE bool Polyhedron::SetRemovedWord(size_t word, uint64_t maybe, ui
   return surely != 0;
 }
 
-// Of the nodes that the bits of `doubtful`, of a word, stand for: those that are cut off, by their own errors if those
-// tell, else exactly.
+// Decides the nodes that the bits of `doubtful`, of a word, stand for, by their own errors if those tell, else exactly.
+// Returns the bits of nodes that are cut off.
 [[gnu::noinline]] uint64_t Polyhedron::DecideDoubtful(size_t word, uint64_t doubtful, const Point<3>& generator) {
   const Point<3> w = ScaledTo(generator);
   const double length_sq = NormSq<3>(w);
@@ -132,7 +132,7 @@ WELLSPACE_INLINE bool Polyhedron::SetRemovedWord(size_t word, uint64_t maybe, ui
   return removed;
 }
 
-// Lists the nodes that are cut off, and the edges of the horizon around them: those of their triangles that no other of
+// Lists the nodes that are cut off, and the edges of the horizon around them: edges of their triangles that no other of
 // them has the other way round.
 WELLSPACE_INLINE void Polyhedron::FindHorizon() {
   removed_count_ = 0;
@@ -172,7 +172,7 @@ WELLSPACE_INLINE uint64_t Polyhedron::NoteEdgesOfRemoved() {
 // The removed triangles are a disk, since decisions are exact: the nodes beyond a plane are a connected part of a
 // convex polyhedron, and so are the others. Let it have F triangles, h edges on its horizon, and so h planes there, and
 // i planes inside, which the new one cuts off altogether. Its edges are (3 F + h) / 2, so Euler's formula for a disk, V
-// - E + F = 1, says h + 2 i = F + 2. Together with one edge from each plane this is what the check asks.
+// - E + F = 1, says h + 2 i = F + 2. The check asks for that, and for one edge from each plane.
 WELLSPACE_INLINE void Polyhedron::ListHorizon(uint64_t touched) {
   const auto touched_count = static_cast<size_t>(std::popcount(touched));
   HorizonEdge* const horizon = horizon_.data();
@@ -183,7 +183,7 @@ WELLSPACE_INLINE void Polyhedron::ListHorizon(uint64_t touched) {
     const uint64_t to = leads_to_[from] & ~leads_from_[from];
     leads_to_[from] = 0;
     leads_from_[from] = 0;
-    // No branch, since it could not be predicted: what is written for a plane inside is written over.
+    // No branch, since it could not be predicted: the value written for a plane inside is written over.
     horizon[horizon_count] = {static_cast<uint16_t>(from),
                               static_cast<uint16_t>(std::countr_zero(to | uint64_t{1} << 63))};
     doubled |= to & (to - 1) & -static_cast<uint64_t>(to != 0);
@@ -194,7 +194,7 @@ WELLSPACE_INLINE void Polyhedron::ListHorizon(uint64_t touched) {
   AbortUnlessCellHolds(doubled == 0 && horizon_count_ + 2 * inside == removed_count_ + 2);
 }
 
-// The same by sorting edges: the two that join the same planes, one in each direction, come one after the other.
+// FindHorizon by sorting edges: the two that join the same planes, one in each direction, come one after the other.
 [[gnu::noinline]] void Polyhedron::FindHorizonAmongMany() {
   sorted_edges_.clear();
   for (uint32_t node = 0; node < count_; ++node) {
@@ -227,7 +227,7 @@ WELLSPACE_INLINE void Polyhedron::ListHorizon(uint64_t touched) {
   AbortUnlessCellHolds(horizon_count_ >= 3);  // a new facet has three corners at least
 }
 
-// Computes the nodes where `plane` meets the edges of the cell that lead out of what is cut off: such an edge runs
+// Computes the nodes where `plane` meets the edges of the cell that lead out of the removed part: such an edge runs
 // along the two planes of an edge of the horizon. Four at a time.
 //
 // As Meet does, by Cramer's rule in doubles: wrong by at most 64 * 2^-53 P (d + d' + d'' + |x|) / |det|, where P is the
@@ -239,7 +239,7 @@ WELLSPACE_INLINE void Polyhedron::PlaceOnHorizon(uint32_t plane) {
   const double n_sq = NormSq<3>(n);
   std::fill_n(&horizon_[horizon_count_], 3, horizon_[0]);  // four are read at a time
   for (size_t first = 0; first < horizon_count_; first += 4) {
-    // Of the planes p and q of each edge the normals, by axis, then the offsets; n is the normal of the new plane.
+    // The normals of the planes p and q of each edge, by axis, then their offsets; n is the normal of the new plane.
     // x = (offset of p (q x n) + of q (n x p) + of n (p x q)) / det(p, q, n).
     const HorizonEdge* const edges = &horizon_[first];
     Four p[4];
@@ -321,7 +321,7 @@ WELLSPACE_INLINE void Polyhedron::MakeRoomForNodes(size_t count) {
   }
 }
 
-// Puts the new nodes in the place of those cut off. They take their places first; what is left over goes to the end,
+// Puts the new nodes in the place of those cut off. They take their places first; the rest goes to the end,
 // and of places that are left those at the end are filled.
 WELLSPACE_INLINE void Polyhedron::Replace(uint32_t plane) {
   const size_t old = count_;

@@ -1,4 +1,4 @@
-// The Voronoi cell of one vertex in space under construction: Polytope<3>. What its functions promise is said in
+// The Voronoi cell of one vertex in space under construction: Polytope<3>. The promises of its functions are in
 // cell_class.h.
 #ifndef WELLSPACE_CORE_CELL_POLYHEDRON_H_
 #define WELLSPACE_CORE_CELL_POLYHEDRON_H_
@@ -23,10 +23,10 @@
 namespace wellspace::core {
 
 // The cell in space: a simple polyhedron, kept as its dual, a triangulated sphere. A plane is a vertex of the sphere, a
-// node a triangle of three planes, an edge between two nodes one between two planes. A cut is what the insertion of a
-// vertex is to a convex hull. The nodes beyond the bisector are a disk of triangles, which are taken out. Each edge of
+// node a triangle of three planes, an edge between two nodes one between two planes. A cut is dual to an insertion of a
+// vertex into a convex hull. The nodes beyond the bisector are a disk of triangles, which are taken out. Each edge of
 // the horizon around the disk makes a new triangle with the new plane. Which triangle is beside which need not be known
-// for that. What floats leave in doubt is decided exactly.
+// for that. Doubts that floats leave are decided exactly.
 //
 //   FindRemoved      which nodes are beyond the bisector, in floats; in doubt by DecideDoubtful
 //   AddBisector      the new plane (float_cell.h)
@@ -35,7 +35,7 @@ namespace wellspace::core {
 //   Replace          new nodes into the places of those that go
 //   SetReach         the distance of the farthest node
 //
-// These are in polyhedron.cc; what places nodes, and finds their neighbours, in polyhedron_nodes.cc. Cells of more than
+// Cuts are in polyhedron.cc; placing of nodes, and their neighbours, in polyhedron_nodes.cc. Cells of more than
 // kWordBits nodes or planes, which are rare, go by the functions called AmongMany.
 //
 // Thread safety: thread-compatible. Reused from site to site: no allocation once warm.
@@ -67,8 +67,8 @@ class Polyhedron : public FloatCell<3> {
  private:
   friend struct CellOnUnit<Polyhedron, 3>;
 
-  // What is computed of kGroupSize nodes at a time, in the units of the nodes. Lanes beyond the last node are at the
-  // site, which no bisector cuts off.
+  // The values computed for kGroupSize nodes at a time, in the units of the nodes. Lanes beyond the last node are at
+  // the site, which no bisector cuts off.
   struct alignas(kGroupSize * sizeof(float)) Group {
     float x[3][kGroupSize];
     float edge_sq[kGroupSize];  // the least plane_edge_sq_ of the three planes: of the shortest edge from the site
@@ -78,7 +78,7 @@ class Polyhedron : public FloatCell<3> {
     std::array<uint16_t, 3> planes;
     bool is_at_edge_end = false;  // it was put at the end of its edge, which was too short to tell them apart
   };
-  // What nodes are computed from, of a plane: one vector, where a Plane is too large to be read fast.
+  // The part of a plane from which nodes are computed: one vector, where a Plane is too large to be read fast.
   struct alignas(4 * sizeof(double)) PlaneRow {
     double normal[3];
     double offset;
@@ -91,7 +91,7 @@ class Polyhedron : public FloatCell<3> {
   };
   // Nodes and planes up to so many have a bit each in one word.
   static constexpr size_t kWordBits = 64;
-  // So many nodes are placed together.
+  // The number of nodes that are placed together.
   static constexpr size_t kPlacedAtOnce = 4;
 
   // ---- Cuts
@@ -161,7 +161,7 @@ class Polyhedron : public FloatCell<3> {
     }
   }
 
-  // Arrays only grow; what is in them beyond their count means nothing, but for groups_. Those of FloatCell are here
+  // Arrays only grow; values beyond their count mean nothing, but for groups_. Those of FloatCell are here
   // for completeness.
   //
   //   array            index                  count            holds                               valid
@@ -172,7 +172,7 @@ class Polyhedron : public FloatCell<3> {
   //                                                            the site to its vertex; 0: wall
   //   groups_          node / 8, lane         count_           position, shortest edge             always
   //   triangles_       node                   count_           planes                              always
-  //   nodes_           node                   count_           what nodes() tells                  once placed or rough
+  //   nodes_           node                   count_           the result of nodes()               once placed or rough
   //   of one cut
   //   removed_words_   node / 64, bit         count_           whether the node is cut off         from FindRemoved on
   //   removed_         0, 1, ...              removed_count_   nodes cut off, ascending            from FindHorizon on

@@ -45,7 +45,7 @@ WELLSPACE_INLINE void Polyhedron::PlaceWantedWith(IsWanted is_wanted) {
   nodes_.resize(count_);
   placed_reach_ = 0;
   for (size_t first = 0; first < count_; first += kPlacedAtOnce) {
-    // The last node in the place of those that are none.
+    // Lanes beyond the last node get that one.
     std::array<uint32_t, kPlacedAtOnce> nodes;
     bool is_any_wanted = false;
     for (size_t lane = 0; lane < kPlacedAtOnce; ++lane) {

@@ -152,7 +152,7 @@ void Polytope<D>::Tighten() {
   }
 }
 
-// Decides what the excesses leave in doubt. Returns whether anything is cut off.
+// Decides the nodes that the excesses leave in doubt. Returns whether anything is cut off.
 template <int D>
 WELLSPACE_INLINE bool Polytope<D>::DecideDoubtful(const Point<D>& generator) {
   size_t first = 0;  // node of the word
@@ -291,7 +291,7 @@ WELLSPACE_INLINE void Polytope<D>::PlaceCutEdges(uint16_t plane) {
   largest_slack_ = largest_slack;
 }
 
-// The planes of a new node: those that the edge at an end runs along, then the new one.
+// The planes of a new node: the planes that the edge at an end runs along, then the new one.
 template <int D>
 WELLSPACE_INLINE std::array<uint16_t, D> Polytope<D>::PlanesOn(End kept, uint16_t plane) const {
   const NodeTopology& topology = topologies_[NodeOf(kept)];
@@ -306,7 +306,7 @@ WELLSPACE_INLINE std::array<uint16_t, D> Polytope<D>::PlanesOn(End kept, uint16_
   return planes;
 }
 
-// One new node on each cut edge. They take the places of removed nodes first; what is left over goes to the end, so
+// Makes one new node on each cut edge. They take the places of removed nodes first; the rest goes to the end, so
 // that the nodes stay without holes.
 template <int D>
 WELLSPACE_INLINE void Polytope<D>::MakeNewNodes(uint16_t plane) {

@@ -1,7 +1,7 @@
 // The Voronoi cell of one vertex under construction: a bounded simple polytope, cut by one bisector after the other.
 // Polytope<D> is its name in every dimension. In the plane it is a Polygon, in space a Polyhedron, which are several
 // times as fast; the template here is for 4-D to 6-D. All three are a CellClass, as polytope.cc asserts, and
-// cell_class.h has what all three promise.
+// cell_class.h has the promises of all three.
 #ifndef WELLSPACE_CORE_CELL_POLYTOPE_H_
 #define WELLSPACE_CORE_CELL_POLYTOPE_H_
 
@@ -28,8 +28,8 @@ namespace wellspace::core {
 // nodes beyond the bisector, and puts a new node on each edge that leads out of these. Then it joins the new nodes
 // along the edges of the new facet.
 //
-// What its functions promise is said in cell_class.h, but for BoundExcesses. What cuts is in polytope.cc; what places
-// nodes, and looks at them, in polytope_nodes.cc.
+// The promises of its functions are in cell_class.h, but for BoundExcesses. Cuts are in polytope.cc; the code that
+// places nodes, and looks at them, in polytope_nodes.cc.
 //
 // Thread safety: thread-compatible. Reused from site to site: no allocation once warm.
 // Invariants: (1) the graph of nodes is that of a simple polytope: every node has D planes and D neighbours, an edge
@@ -50,8 +50,8 @@ class Polytope {
     return CutBeforePlace(u, position, normal, NormSq<D>(normal));
   }
   size_t CutByEach(std::span<const Point<D>> positions, const VertexNames& names, VertexId site);
-  // Computes `excess_bound` of the candidates from `begin` on: those for which it is negative do not cut the cell, now
-  // or later.
+  // Computes `excess_bound` of the candidates from `begin` on: candidates for which it is negative do not cut the cell,
+  // now or later.
   //
   // Complexity: O(nodes) a candidate.
   // Errors:     none.
@@ -95,10 +95,10 @@ class Polytope {
   static size_t NodeOf(End end) { return end >> kSlotBits; }
   static size_t SlotOf(End end) { return end & ((1u << kSlotBits) - 1); }
 
-  // What a node is, but for its position and its neighbours: which planes meet there.
+  // A node without its position and its neighbours: the planes that meet there.
   struct NodeTopology {
     std::array<uint16_t, D> planes;  // by index, as in CellNode once placed
-    bool is_placed = false;          // the position is the one that the planes alone give
+    bool is_placed = false;          // the position follows from the planes alone
   };
   // An edge between a node that stays and one that goes.
   struct CutEdge {
@@ -116,8 +116,8 @@ class Polytope {
   struct NewPlane {
     uint16_t index;
     double length;              // of the normal
-    double offset_error;        // of an excess, but for what the slack of the node adds
-    double rounding;            // what a new slack holds beside the errors of the ends
+    double offset_error;        // of an excess, without the part for the slack of the node
+    double rounding;            // the part of a new slack beside the errors of the ends
     double largest_good_slack;  // a node with more is placed by its planes
     std::span<const double> excesses;
     std::span<const Row> rows;
@@ -161,14 +161,14 @@ class Polytope {
   uint64_t cuts_ = 0;
   DecisionCounters counters_;
 
-  // Arrays of the cell and of one cut. Arrays only grow; what is in them beyond their count means nothing.
+  // Arrays of the cell and of one cut. Arrays only grow; values beyond their count mean nothing.
   //
   //   array          index              count             holds                              valid
   //   planes_        plane              plane_count_      walls, then bisectors as they cut   always
   //   columns_       node               its count()       position and slack                 always
   //   topologies_    node               columns_.count()  planes                             always
   //   opposite_      End: node, slot    as topologies_    the other end of the edge          always
-  //   nodes_         node               its size()        what nodes() tells                 once placed, or rough
+  //   nodes_         node               its size()        the result of nodes()              once placed, or rough
   //   removed_       0, 1, ...          removed_count_    nodes cut off, ascending           from FindCutEdges on
   //   cut_edges_     cut edge 0, 1, ... cut_count_        edges from a node kept to one not  from FindCutEdges on
   //   new_rows_      cut edge           cut_count_        where the new node is to be        from PlaceCutEdges on

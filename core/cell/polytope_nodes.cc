@@ -1,4 +1,4 @@
-// The nodes of a cell from 4-D on once it has been cut: where they are, by their planes, and what is asked of them.
+// The nodes of a cell from 4-D on once it has been cut: their places, by their planes, and the queries of them.
 #include <algorithm>
 #include <array>
 #include <cmath>

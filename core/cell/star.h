@@ -9,7 +9,7 @@
 
 namespace wellspace::core {
 
-// Of each simplex the D vertices beside the one whose star it is.
+// The simplices at a vertex: of each the D other vertices.
 template <int D>
 using Star = std::vector<std::array<VertexId, D>>;
 

@@ -60,8 +60,11 @@ constexpr Calibration kWellSpaced3[] = {
 
 template <int D>
 std::span<const Calibration> CalibrationFor(Criterion criterion) {
-  if (criterion == Criterion::kWellSpaced) {
-    return D == 2 ? std::span<const Calibration>(kWellSpaced2) : std::span<const Calibration>(kWellSpaced3);
+  switch (criterion) {
+    case Criterion::kWellSpaced:
+      return D == 2 ? std::span<const Calibration>(kWellSpaced2) : std::span<const Calibration>(kWellSpaced3);
+    case Criterion::kRadiusEdge:
+      break;
   }
   return D == 2 ? std::span<const Calibration>(kRadiusEdge2) : std::span<const Calibration>(kRadiusEdge3);
 }

@@ -11,8 +11,8 @@
 
 namespace wellspace::core {
 
-// The integrals that vertices are counted by. Those over the box are of lfs^-D times Grading, those over its faces of
-// (distance to the second nearest point)^-(D-1).
+// The integrals that vertices are counted by. Integrals over the box are of lfs^-D times Grading, those over its faces
+// of (distance to the second nearest point)^-(D-1).
 enum Term {
   kPoints,      // where two points decide about lfs
   kNearFace,    // where a point and a face of the box do

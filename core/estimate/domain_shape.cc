@@ -11,9 +11,9 @@
 namespace wellspace::core {
 namespace {
 
-// What a sum may be off by, over the sum of what was added.
+// The error of a sum, over the sum of its terms.
 constexpr double kRounding = 0x1p-46;
-// What a place on a segment may be off by, over its coordinates.
+// The error of a place on a segment, over its coordinates.
 constexpr double kPlace = 0x1p-50;
 
 }  // namespace
@@ -91,8 +91,8 @@ double DomainShape::area() const {
   return sum;
 }
 
-// By Green's theorem: of each place on the first axis, faces have what lies between the segments above and below it.
-// What lies above the box counts as its upper side, and what lies below as the lower one.
+// By Green's theorem: at each place on the first axis, faces hold the part between the segments above and below it.
+// Places above the box count as its upper side, and places below as the lower one.
 double DomainShape::AreaIn(const Box<2>& part) const {
   Sum sum;
   if (!edges_.empty()) {
@@ -101,7 +101,7 @@ double DomainShape::AreaIn(const Box<2>& part) const {
   return std::max(0.0, sum.value - kRounding * sum.size);
 }
 
-// Adds what of `part` lies below edges: where faces are below an edge, it leads backwards, and counts in full; else it
+// Adds the area of `part` below edges: where faces are below an edge, it leads backwards, and counts in full; else it
 // is taken off.
 void DomainShape::AddBelow(size_t level, size_t index, const Box<2>& part, Sum& sum) const {
   const Node& node = levels_[level][index];

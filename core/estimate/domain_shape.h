@@ -1,4 +1,4 @@
-// How large the faces of a domain in the plane are, and what of them lies in a box.
+// The area of the faces of a domain in the plane, and of their parts in boxes.
 #ifndef WELLSPACE_CORE_ESTIMATE_DOMAIN_SHAPE_H_
 #define WELLSPACE_CORE_ESTIMATE_DOMAIN_SHAPE_H_
 
@@ -13,7 +13,7 @@
 
 namespace wellspace::core {
 
-// The faces that are meshed. Areas are bounds from below: what may have been rounded up is taken off.
+// The faces that are meshed. Areas are bounds from below: the possible rounding up is taken off.
 //
 // Thread safety: immutable.
 class DomainShape {
@@ -36,7 +36,7 @@ class DomainShape {
   const std::vector<Part>& parts() const { return parts_; }  // of least areas first
   double area() const;
 
-  // What of the faces lies in `part`.
+  // The part of the faces in `part`.
   //
   // Complexity: O(sqrt(n)) for most domains and boxes.
   double AreaIn(const Box<2>& part) const;
@@ -55,7 +55,7 @@ class DomainShape {
  private:
   static constexpr size_t kRun = 16;
 
-  // A segment with what is meshed on its left.
+  // A segment with a meshed face on its left.
   struct Edge {
     Point<2> from;
     Point<2> to;
@@ -69,7 +69,7 @@ class DomainShape {
   // A sum, and how much of it may have come from rounding.
   struct Sum {
     double value = 0;
-    double size = 0;  // of what was added, without signs
+    double size = 0;  // the sum of the terms' sizes, without signs
   };
 
   bool Contains(const Point<2>& p) const;
@@ -80,7 +80,7 @@ class DomainShape {
   Box<2> box_;
   double largest_ = 0;  // coordinate
   std::vector<Part> parts_;
-  std::vector<Edge> edges_;                // those that bound what is meshed
+  std::vector<Edge> edges_;                // the segments that bound meshed faces
   std::vector<std::vector<Node>> levels_;  // over runs of edges, and over pairs of nodes
 };
 

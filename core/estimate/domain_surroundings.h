@@ -1,4 +1,4 @@
-// What is around a place of a domain in the plane: segments, and the face that it lies in.
+// The surroundings of a place of a domain in the plane: segments, and the face that it lies in.
 #ifndef WELLSPACE_CORE_ESTIMATE_DOMAIN_SURROUNDINGS_H_
 #define WELLSPACE_CORE_ESTIMATE_DOMAIN_SURROUNDINGS_H_
 
@@ -21,8 +21,8 @@
 
 namespace wellspace::core {
 
-// Looks at the segments that the leaf of a place lists and at no others: what is farther away than the leaf is large
-// hardly counts. Faces are those of the nearest segment, as far as doubles tell.
+// Looks at the segments that the leaf of a place lists and at no others: segments farther away than the leaf's side
+// hardly count. Faces are those of the nearest segment, as far as doubles tell.
 //
 // Thread safety: thread-compatible.
 class DomainSurroundings {
@@ -56,7 +56,7 @@ class DomainSurroundings {
 
   const Face& face(uint32_t number) const { return domain_.faces().faces[number]; }
 
-  // Segments that have been compared with places, or with parts of a leaf, in all; what looking costs.
+  // Segments that have been compared with places, or with parts of a leaf, in all; the cost of looking.
   uint64_t compared() const;
 
  private:

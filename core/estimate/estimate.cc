@@ -31,8 +31,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 template <int D>
 constexpr std::array<double, 2> kRamp = D == 2 ? std::array{-0.5, 1.0} : std::array{-0.05, 1.45};
 
-// Sizes below this part of the longest side count as this: no coordinates could tell such edges apart, and what is
-// integrated over so few halvings stays finite, whatever is asked for.
+// Sizes below this part of the longest side count as this: no coordinates could tell such edges apart, and integrals
+// over so few halvings stay finite, whatever is asked for.
 constexpr double kLeastSize = 0x1p-60;
 
 // More vertices than any leaf is predicted to take.
@@ -52,7 +52,7 @@ class Draws {
 
 // ---- The integrals over leaves; docs/design/estimate.md has the model
 
-// What a leaf adds to the mesh.
+// The share of a leaf in the mesh.
 struct Share {
   Terms terms{};
   double sizes = 0;  // vertices for the sake of sizes, over those of the terms
@@ -73,7 +73,7 @@ class Integrator {
   }
 
   absl::Status Prepare(const QueryStructure<D>& structure, const RunContext& context) {
-    // The corners of the box count as its boundary, not as points; those that were not given come last.
+    // The corners of the box count as its boundary, not as points; corners that were not given come last.
     std::span<const Point<D>> points = structure.points();
     std::vector<uint32_t> corners;
     for (uint32_t i = 0; i < structure.vertex_count(); ++i) {
@@ -145,7 +145,7 @@ class Integrator {
     double spacing = 0;       // of that vertex: to its nearest feature
     FaceMask faces = 0;       // of that vertex
     double second_point = 0;  // distance to the second nearest point
-    Term term = kPoints;      // what decides about lfs
+    Term term = kPoints;      // the term that decides lfs
     uint32_t face = 0;        // of the domain, if there is one
   };
 
@@ -166,7 +166,7 @@ class Integrator {
     return result;
   }
 
-  // What the segments of a domain are around `x`; its box does not count.
+  // The surroundings of `x` among the segments of a domain; its box does not count.
   void AddSegments(const Point<2>& x, const NearestTwo& two, Surroundings& result) {
     const DomainSurroundings::Found found = domain_->LookAt(x, VertexId{two.first});
     result.opposite = found.two_segments;
@@ -180,7 +180,7 @@ class Integrator {
     result.term = result.lfs == result.opposite ? kOpposite : result.lfs < result.second_point ? kNearFace : kPoints;
   }
 
-  // What the faces and corners of the box are around `x`.
+  // The surroundings of `x` among the faces and corners of the box.
   void AddBox(const Point<D>& x, const NearestTwo& two, Surroundings& result) {
     const bool has_point = two.first_sq < kInfinity;
     result.faces = has_point ? box_.FacesOf(points_[two.first]) : FaceMask{0};
@@ -375,7 +375,7 @@ class Integrator {
 
 // ---- Sampling
 
-// What becomes of a leaf that holds `vertices` in the end, `at_first` before refinement: it is split for as long as its
+// The leaves made of one that holds `vertices` in the end, `at_first` before refinement: it is split for as long as its
 // parts are too full. How many there will be is known to about a quarter. Vertices keep apart, so that leaves of less
 // than one hold one at most.
 template <int D>
@@ -403,7 +403,7 @@ struct Sample {
   double error = 0;
 };
 
-// Leaves that are alike, of which some are drawn without replacement, and what these tell of all.
+// A stratum of a sample: leaves that are alike, of which some are drawn without replacement, and sums over these.
 struct Stratum {
   std::vector<NodeId> leaves;  // the first `taken` have been looked at
   size_t taken = 0;
@@ -413,7 +413,7 @@ struct Stratum {
   double vertices_sq = 0;
 
   double Factor() const { return taken == 0 ? 0.0 : static_cast<double>(leaves.size()) / static_cast<double>(taken); }
-  // Of the vertices in all. REQUIRES: some have been looked at.
+  // The variance of the estimate of all their vertices. REQUIRES: some have been looked at.
   double VarianceOfSum() const {
     const auto count = static_cast<double>(leaves.size());
     const auto k = static_cast<double>(taken);

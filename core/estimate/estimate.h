@@ -20,7 +20,7 @@ struct SizeEstimate {
   // The standard error of `vertices`, as a share of it, that comes from not looking at every leaf; 0 where all were
   // looked at. The error of the model is not in it.
   double sampling_error = 0;
-  // In a domain: segments that have been compared with places, or with parts of a leaf; what it has cost.
+  // In a domain: segments that have been compared with places, or with parts of a leaf: the cost so far.
   uint64_t segments_compared = 0;
 };
 
@@ -35,13 +35,13 @@ struct EstimateEffort {
   uint64_t looks = uint64_t{1} << 17;
 };
 
-// Enough for a bar of progress, at about a hundredth of what meshing costs.
+// Enough for a bar of progress, at about a hundredth of the cost of meshing.
 inline constexpr EstimateEffort kGlance{0.15, 24, 64, uint64_t{1} << 11};
 
-// Predicts what refinement for `criteria` will make of `structure`.
+// Predicts the size of the mesh that refinement of `structure` for `criteria` will make.
 //
-// Shapes:     structure: as QueryStructure::Initialize leaves it; nothing has been refined. domain: what its segments
-//             bound, in the plane; null: the box.
+// Shapes:     structure: as QueryStructure::Initialize leaves it; nothing has been refined. domain: the faces that its
+//             segments bound, in the plane; null: the box.
 // Units:      counts and bytes.
 // REQUIRES:   criteria.rho at least MinimumRho(D).
 // Guarantees: (1) with the default effort, by the radius-edge criterion without sizes, each figure is right within a

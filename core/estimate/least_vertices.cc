@@ -15,7 +15,7 @@
 namespace wellspace::core {
 namespace {
 
-// What sizes and circumcentres may be off by rounding is far below this.
+// The rounding of sizes and circumcentres is far below this.
 constexpr double kRounding = 0.99;
 
 // Across, no place of a box is farther than this times rho times its shortest side from a vertex: 3 sqrt(3 / 2),
@@ -47,7 +47,7 @@ std::array<double, D> SidesOf(const Box<D>& box) {
   return sides;
 }
 
-// The volume of what two boxes share, in units of `unit`^D.
+// The volume that two boxes have in common, in units of `unit`^D.
 template <int D>
 double SharedVolume(const Box<D>& a, const Box<D>& b, double unit) {
   double volume = 1;
@@ -67,7 +67,7 @@ Box<D> Grown(const Box<D>& box, double by) {
   return grown;
 }
 
-// Vertices that cover a box if each covers what is within `reach`: the most that any projection to some axes wants.
+// The least vertices that cover a box by balls of radius `reach`: the most that any projection to some axes wants.
 template <int D>
 double LeastToCover(const Box<D>& box, double reach) {
   std::array<double, D> sides = SidesOf<D>(box);
@@ -93,7 +93,7 @@ double LeastPerSizeEverywhere() {
   return D == 3 ? kCovering3 / BallVolume(D) : LeastPerSize<D>();
 }
 
-// What is meshed: the box, or the faces of a domain.
+// The meshed part: the box, or the faces of a domain.
 template <int D>
 struct BoxShape {
   Box<D> box;
@@ -121,7 +121,7 @@ struct BoxShape {
 };
 
 struct FacesShape {
-  // With more boxes of sizes, what each shares with the faces is not looked at, but taken as that of its neighbourhood.
+  // With more boxes of sizes, the area of faces around each is estimated by the faces' share of the whole box.
   static constexpr size_t kFewRegions = 8;
 
   const DomainShape& domain;
@@ -255,7 +255,7 @@ double LeastFor(const Shape& shape, const SizeField<D>& sizes) {
   const Box<D>& box = shape.box;
   const double unit = box.LongestSide();
   const double everywhere = sizes.max_circumradius();
-  // The smallest sizes first, of each box what no smaller size has been counted in.
+  // The smallest sizes first; of each box the part in which no smaller size has been counted.
   std::vector<typename SizeField<D>::Region> regions = sizes.regions();
   std::sort(regions.begin(), regions.end(), [](const auto& a, const auto& b) { return a.size < b.size; });
   double rest = shape.Volume(unit);
@@ -296,8 +296,8 @@ double TypicalFor(const Shape& shape, const SizeField<D>& sizes,
   for (const auto& region : sizes.regions()) {
     double size = std::max(region.size, sizes.least());
     double before = 0;
-    // What is nearer to the box than its size, and then shells about that, in which sizes are as large as the shell is
-    // far, times the growth.
+    // The places nearer to the box than its size, and then shells about them, in which sizes are as large as the shell
+    // is far, times the growth.
     for (double reach = size / growth; size < everywhere && kVerticesPerSize<D> * sum <= most;
          size = growth * reach, reach *= kShellRatio) {
       const double within = shape.AboutIn(Grown<D>(region.place, reach), unit);

@@ -1,4 +1,4 @@
-// How many vertices a mesh has at least, by proof, and about, by a formula: what cannot be met is refused before any
+// How many vertices a mesh has at least, by proof, and about, by a formula: a hopeless demand is refused before any
 // work.
 #ifndef WELLSPACE_CORE_ESTIMATE_LEAST_VERTICES_H_
 #define WELLSPACE_CORE_ESTIMATE_LEAST_VERTICES_H_
@@ -23,7 +23,7 @@ namespace wellspace::core {
 // Source:     Coxeter, Few and Rogers 1959, for 3-D; docs/design/estimate.md.
 template <int D>
 double LeastVerticesForSizes(const Box<D>& box, const SizeField<D>& sizes);
-// The same of a domain in the plane, with the largest areas in its faces: of these the first bound holds for each
+// The bound for a domain in the plane, with the largest areas in its faces: of these the first bound holds for each
 // alone, and no edge on a segment is longer than twice the circumradius beside it.
 //
 // Complexity: O(regions^2), and O(n log n) for n segments.

@@ -12,12 +12,12 @@
 
 namespace wellspace::core {
 
-// Of what was measured, docs/design/estimate.md says more: in the sections that are named below.
+// The sections of docs/design/estimate.md that are named below have the measurements.
 
 // Leaves that refinement leaves behind.
 struct Leaves {
   double all = 0;
-  double filled = 0;  // those with vertices
+  double filled = 0;  // leaves with vertices
 };
 
 // Simplices per vertex without a boundary. In 2-D by Euler's formula; in 3-D as measured: 5 to 6 around surfaces and
@@ -47,11 +47,12 @@ double SimplicesOf(double vertices, double on_boundary) {
   }
 }
 
-// What a process touches whatever the mesh, as measured: code, threads, their stacks and scratch space. "The model".
+// The memory that a process touches whatever the mesh, as measured: code, threads, their stacks and scratch space. "The
+// model".
 inline constexpr double kFixedBytes = 5.2e6;
 
-// What arrays leave free of the large pages that they share (PagePool), as measured: this part of all, up to this size.
-// "Calibration" has what the estimate of the memory is with it, and with the margin.
+// The memory that arrays leave free of the large pages that they share (PagePool), as measured: this part of all, up to
+// this size. "Calibration" has the estimates of the memory with it, and with the margin.
 inline constexpr double kLeftFree = 0.3;
 inline constexpr double kMostLeftFree = 3e6;
 
@@ -59,8 +60,8 @@ inline constexpr double kMostLeftFree = 3e6;
 // two ends about as far from 1.
 inline constexpr double kMemoryMargin = 1.25;
 
-// The memory at its peak, when the mesh has been put together. Vectors grow by doubling, but of what they reserve only
-// what they use is ever touched; what that leaves free of the last large page of each is within the margin.
+// The memory at its peak, when the mesh has been put together. Vectors grow by doubling, but of the bytes that they
+// reserve only those in use are ever touched; the free rest of the last large page of each is within the margin.
 template <int D>
 double BytesOf(const Leaves& leaves, double vertices, double simplices) {
   constexpr double kChildren = LeafTree<D>::kChildren;
@@ -79,8 +80,8 @@ double BytesOf(const Leaves& leaves, double vertices, double simplices) {
   return kMemoryMargin * (kFixedBytes + in_use + std::min(kLeftFree * in_use, kMostLeftFree));
 }
 
-// What a domain in the plane takes beside that: by vertex its place, and its triangles with their faces, which are kept
-// from the refinement to the output; by segment graph, faces and lists, as measured.
+// The memory of a domain in the plane beside that: by vertex its place, and its triangles with their faces, which are
+// kept from the refinement to the output; by segment graph, faces and lists, as measured.
 inline double DomainBytesOf(double vertices, double segments) {
   constexpr double kVertexBytes = 24 + 2 * (3 * sizeof(uint32_t) + sizeof(uint32_t));
   constexpr double kSegmentBytes = 200;

@@ -42,7 +42,7 @@ class NearSegments {
   // until it returns false. Where skip(v) is true, segments that end at vertex v may be left out.
   //
   // REQUIRES:   x in the leaf.
-  // Complexity: O(log s) and what is visited or as near, for s segments; and O(s) for cells that are cut, the first
+  // Complexity: O(log s + k) for s segments, k of them visited or as near; and O(s) for cells that are cut, the first
   //             time that a place among them is looked at.
   template <typename Visit, typename Skip>
   void ForEachFrom(const Point<2>& x, Visit visit, Skip skip) {
@@ -63,7 +63,7 @@ class NearSegments {
     }
   }
 
-  // Segments that have been compared with a cell or a place, in all; what this costs.
+  // Segments that have been compared with a cell or a place, in all: the cost of looking.
   uint64_t compared() const { return compared_; }
 
  private:
@@ -77,7 +77,7 @@ class NearSegments {
     VertexId common = kNoVertex;  // where all of them end, if they do
     int depth = 0;
   };
-  // What is to be looked at: a segment or a cell, which is no farther than anything in it.
+  // An entry that is to be looked at: a segment or a cell, which is no farther than anything in it.
   struct Entry {
     double distance = 0;
     bool is_segment = false;  // cells first, so that all that is as far is known
@@ -86,7 +86,7 @@ class NearSegments {
     auto operator<=>(const Entry&) const = default;
   };
 
-  // Puts what is in a cell into the queue.
+  // Puts the segments and parts of a cell into the queue.
   void Open(const Point<2>& x, uint32_t cell);
   void Cut(uint32_t cell);
   VertexId CommonEnd(std::span<const uint32_t> segments) const;

@@ -84,7 +84,7 @@ class NearestPoints {
     return NearestWithin(x, std::numeric_limits<double>::infinity(), but);
   }
 
-  // The same where two points are known, those that were nearest to a place nearby.
+  // Nearest where two points are known, those that were nearest to a place nearby.
   NearestTwo Nearest(const Point<D>& x, const NearestTwo& nearby) const {
     double limit_sq = std::numeric_limits<double>::infinity();
     if (nearby.second_sq < limit_sq) {

@@ -6,8 +6,8 @@
 
 namespace wellspace::core {
 
-// Orders half-planes that end in the line from `a` to `b` by their angles around it, counterclockwise for who looks
-// along it from b to a; each is given by a point of it. The first is the one of `from`. Exact.
+// Orders half-planes that end in the line from `a` to `b` by their angles around it, counterclockwise for an observer
+// who looks along it from b to a; each is given by a point of it. The first is the one of `from`. Exact.
 //
 // Thread safety: thread-safe.
 class AngleOrder {

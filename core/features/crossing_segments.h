@@ -1,4 +1,4 @@
-// Where segments of the plane meet each other and points, and what may be wrong there.
+// Where segments of the plane meet each other and points, and the faults there.
 #ifndef WELLSPACE_CORE_FEATURES_CROSSING_SEGMENTS_H_
 #define WELLSPACE_CORE_FEATURES_CROSSING_SEGMENTS_H_
 
@@ -12,7 +12,7 @@
 
 namespace wellspace::core {
 
-// Which side of the line from `a` to `b` a point is on; exact.
+// The side of the line from `a` to `b` that a point is on; exact.
 inline Sign SideOf(const Point<2>& a, const Point<2>& b, const Point<2>& p) { return Orientation<2>({a, b, p}).sign; }
 
 // Whether `p`, a point of the line through `a` and `b`, lies strictly between them.
@@ -32,7 +32,7 @@ inline Point<2> CrossingFrom(const Point<2>& a, const Point<2>& b, const Point<2
   return {a[0] + at * along[0], a[1] + at * along[1]};
 }
 
-// What is wrong between a segment and a point, or another segment.
+// The fault between a segment and a point, or another segment.
 struct Fault {
   enum class Kind : uint8_t { kOn, kNear, kCrossing, kNeedle };  // a needle: near, and joined to an end of the segment
 

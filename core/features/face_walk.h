@@ -35,9 +35,9 @@ class FaceWalk {
     }
   }
 
-  // Calls visit(face, its half-edges) for each face, in the unbounded one first, and toggle(owner) for each owner of a
-  // ring that is crossed on the way there from the face before. `owners` has sets of them, of which
-  // `set_of`(segment) is that of a segment.
+  // Calls visit(face, its half-edges) for each face, the unbounded one first. On the way there from the face before it
+  // calls toggle(owner) for each owner of a ring that is crossed. `owners` has sets of them, of which `set_of`(segment)
+  // is that of a segment.
   //
   // Complexity: O(f + m), and O(k log k) for the k owners of all segments that are crossed.
   // Errors:     those of `visit`; CANCELLED, DEADLINE_EXCEEDED.

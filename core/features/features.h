@@ -1,4 +1,4 @@
-// What a domain in the plane is bounded by and made of, as it is given: segments, holes and regions.
+// The features of a domain in the plane as they are given: segments, holes and regions.
 #ifndef WELLSPACE_CORE_FEATURES_FEATURES_H_
 #define WELLSPACE_CORE_FEATURES_FEATURES_H_
 
@@ -10,15 +10,15 @@
 
 namespace wellspace::core {
 
-// Which faces of the planar graph of the segments are meshed.
+// The rule by which faces of the planar graph of the segments are meshed.
 enum class FaceRule : uint8_t {
   kBox,      // all faces in the box
   kHoles,    // all bounded faces; the box bounds nothing
-  kEvenOdd,  // those that an odd number of ring segments separates from infinity
-  kUnion,    // those that an odd number of ring segments of some group separates from infinity
+  kEvenOdd,  // faces that an odd number of ring segments separates from infinity
+  kUnion,    // faces that an odd number of ring segments of some group separates from infinity
 };
 
-// What becomes of segments that cross, and of vertices that are too close to a segment.
+// The treatment of segments that cross, and of vertices that are too close to a segment.
 enum class CrossingRule : uint8_t {
   kRefuse,  // an error names them
   kSnap,    // a segment is led through a vertex that is too close to it, or nearer than the snap distance; crossings
@@ -26,13 +26,13 @@ enum class CrossingRule : uint8_t {
   kSplit,   // the same, and a crossing, rounded, becomes a vertex
 };
 
-// What is said of faces: of the one that a point lies in, or of all inside of a polygon.
+// A hole or a region: the face that a point lies in, or all faces inside of a polygon.
 struct FaceSeed {
   Point<2> at{};                                              // the point; of a polygon not looked at
   bool is_hole = false;                                       // the face is not meshed
   int32_t region = 0;                                         // of the simplices in the face, unless a hole
   double max_area = std::numeric_limits<double>::infinity();  // of a simplex there; a squared length
-  // The rings of a polygon, so many segments from the first on. It holds the faces that an odd number of them separates
+  // The rings of a polygon: its segments from the first on. It holds the faces that an odd number of them separates
   // from infinity. 0: it is a point.
   uint32_t first_segment = 0;
   uint32_t segment_count = 0;

@@ -25,7 +25,7 @@ std::vector<uint32_t> OddSets::MembersOf(uint32_t set) const {
     members.push_back(set);
     return members;
   }
-  // Those that two are joined of have lower numbers, so that each comes up as often as it is there, at once.
+  // The sets that two are joined of have lower numbers, so that each comes up as often as it is there, at once.
   std::priority_queue<uint32_t> pending;
   pending.push(set);
   while (!pending.empty()) {

@@ -19,7 +19,7 @@
 namespace wellspace::core {
 namespace {
 
-// Lines are the same only if these differ by less: what is rounded of an angle, in radians, and of a distance from the
+// Lines are the same only if these differ by less: the rounding of an angle, in radians, and of a distance from the
 // origin, relative to the largest coordinate.
 constexpr double kSameAngle = 0x1p-48;
 constexpr double kSameOffset = 0x1p-46;
@@ -204,7 +204,7 @@ class OverlapFinder {
       if (ends[i].is_begin) {
         open.insert(s);
         open_rings += segment.rings;
-        // Places strictly between both ends: those at the end, less those at the begin, less 1.
+        // The number of places strictly between both ends: that at the end, less that at the begin, less 1.
         graph_.counts.touching_vertices -= places + 1;
       } else {
         open.erase(s);

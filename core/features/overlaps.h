@@ -1,4 +1,4 @@
-// Segments that lie on each other: found by sorting, for what they have in common has as many parts as there are pairs.
+// Segments that lie on each other: found by sorting, since there may be as many common parts as pairs.
 #ifndef WELLSPACE_CORE_FEATURES_OVERLAPS_H_
 #define WELLSPACE_CORE_FEATURES_OVERLAPS_H_
 
@@ -11,10 +11,10 @@
 namespace wellspace::core {
 
 // Splits segments of `graph` that lie on a common line, and on each other, at each other's ends, and leaves one of each
-// part; exact. What is on them beside, or crosses them, is left as it is. Segments run from their lower end to the
-// higher one, and no two have both ends in common; they stay in the order of their sources, then along each.
+// part; exact. Other points on them, and segments across, are left as they are. Segments run from their lower end to
+// the higher one, and no two have both ends in common; they stay in the order of their sources, then along each.
 //
-// Complexity: O(m log m), whatever lies on what.
+// Complexity: O(m log m), however many segments lie on each other.
 // Errors:     that of MarkersDifferError; CANCELLED, DEADLINE_EXCEEDED.
 absl::Status UniteOverlaps(PlanarGraph& graph, const RunContext& context);
 

@@ -1,6 +1,6 @@
 #include "core/features/patch_merging.h"
 
-#include <algorithm>
+#include <functional>
 #include <map>
 #include <numeric>
 #include <queue>
@@ -46,7 +46,7 @@ class PatchMerger {
       WELLSPACE_RETURN_IF_ERROR(context_.Check());
       const auto [area, name, patch] = smallest_.top();
       smallest_.pop();
-      // What has grown, or become another one, has an entry of its own.
+      // A patch that has grown, or become another one, has an entry of its own.
       if (owner_[patch] != patch || areas_[patch] != area || name_[patch] != name || neighbours_[patch].empty()) {
         continue;
       }
@@ -117,7 +117,7 @@ class PatchMerger {
   std::vector<double> areas_;
   std::vector<std::map<uint32_t, double>> neighbours_;  // and the length of the crease between
   std::vector<uint32_t> owner_;                         // where the entries of a patch are now
-  std::vector<uint32_t> name_;                          // of what an owner has: the patch that others have joined
+  std::vector<uint32_t> name_;                          // by owner: the patch that others have joined
   const double least_area_;
   const RunContext& context_;
   std::priority_queue<Small, std::vector<Small>, std::greater<Small>> smallest_;

@@ -11,7 +11,7 @@
 
 namespace wellspace::core {
 
-// So much of a weak crease lies between two patches.
+// The length of a weak crease between two patches.
 struct CommonCrease {
   uint32_t one = 0;  // patches, the lower first
   uint32_t other = 0;
@@ -22,7 +22,8 @@ struct CommonCrease {
 // of equal ones the lower; the smallest patch first, and again while it is small. Returns which patch each has become.
 //
 // REQUIRES:   areas: by patch; creases: any order, a pair of patches may come several times.
-// Complexity: O(k log k), k creases, times the logarithm of the patches: who has fewer neighbours gives them away.
+// Complexity: O(k log k), k creases, times the logarithm of the patches: the patch with fewer neighbours gives them
+// away.
 // Errors:     CANCELLED, DEADLINE_EXCEEDED.
 absl::StatusOr<std::vector<uint32_t>> MergePatches(std::span<const double> areas, std::span<const CommonCrease> creases,
                                                    double least_area, const RunContext& context);

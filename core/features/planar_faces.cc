@@ -234,7 +234,7 @@ class FaceFinder {
       return below_[event] == kNone ? unbounded : cycle_of_[below_[event]] + 1;
     };
     for (const uint32_t point : first_points_) {
-      // All its half-edges lead to greater points; left of the last lies what is outside of the component.
+      // All its half-edges lead to greater points; left of the last lies the outside of the component.
       joined.Join(cycle_of_[out_.Around(point).back()] + 1, face_below(point));
     }
     std::vector<uint32_t> number(cycles_ + 1, kNone);
@@ -324,7 +324,7 @@ class FaceFinder {
             graph_.groups, [](const GraphSegment& segment) { return segment.groups; }, toggle, visit);
   }
 
-  // What a point says of a face comes before what polygons do.
+  // A point that names a face comes before polygons.
   absl::Status ApplySeeds() {
     WELLSPACE_ASSIGN_OR_RETURN(const std::vector<uint32_t> polygons,
                                FindPolygonsOfFaces(graph_, out_, seeds_, context_));

@@ -198,7 +198,7 @@ class GraphMaker {
       first.polygons = graph_.polygons.Join(first.polygons, next.polygons);
       first.groups = graph_.groups.Join(first.groups, next.groups);
       is_dropped[order[k]] = true;
-      std::swap(order[k - 1], order[k]);  // the next is compared with what stays
+      std::swap(order[k - 1], order[k]);  // the next is compared with the one that stays
     }
     size_t kept = 0;
     for (size_t i = 0; i < segments.size(); ++i) {
@@ -210,7 +210,7 @@ class GraphMaker {
     return absl::OkStatus();
   }
 
-  // What has been found in a part of the plane.
+  // The findings in a part of the plane.
   struct FaultsOfPart {
     std::vector<Fault> faults;  // some of them twice, as two features may come together in more than one group
     size_t unwanted = 0;
@@ -218,8 +218,8 @@ class GraphMaker {
     size_t next_look = kFaultsBetweenLooks;
   };
 
-  // Of all vertices that lie on segments or too close to them, and all segments that cross; ascending, each once. Stops
-  // early where a part has more than an error tells of.
+  // All faults: vertices that lie on segments or too close to them, and segments that cross; ascending, each once.
+  // Stops early where a part has more than an error tells of.
   absl::StatusOr<std::vector<Fault>> FindFaults() {
     std::vector<Fault> faults;
     if (graph_.segments.empty()) {
@@ -258,7 +258,7 @@ class GraphMaker {
   }
 
   // Tells needles from other points that are too close to a segment: they are closed, whatever the rule, since no
-  // double separates what is in them. So is what merging has opened.
+  // double separates their sides. So are gaps that merging has opened.
   absl::Status FindNeedles(std::vector<Fault>& faults) {
     const auto is_near = [](const Fault& fault) { return fault.kind == Fault::Kind::kNear; };
     if (std::none_of(faults.begin(), faults.end(), is_near)) {
@@ -283,7 +283,7 @@ class GraphMaker {
     return absl::OkStatus();
   }
 
-  // Whether merging has moved what ends at `point`. It may have moved a segment off a vertex that it ran through.
+  // Whether merging has moved the ends of segments at `point`. That may have moved them off vertices on their way.
   bool HasMoved(uint32_t point) const { return point < has_taken_others_.size() && has_taken_others_[point]; }
 
   size_t MostPairs() const { return std::max<size_t>(kMostPairs, max_vertices_); }
@@ -402,7 +402,7 @@ class GraphMaker {
     if (!(t > 0 && t < 1 && distance < reach_)) {
       return std::nullopt;
     }
-    // A segment is led through what is farther away only if both parts are shorter than it, so that this ends: else it
+    // A segment is led through a point farther away only if both parts are shorter than it, so that this ends: else it
     // might be led from one of two points beside each other to the other, and back.
     const bool is_led = std::max(DistanceSq<2>(a, p), DistanceSq<2>(p, b)) < DistanceSq<2>(a, b);
     return distance < least_separation_ || is_led ? std::optional(Fault::Kind::kNear) : std::nullopt;
@@ -421,7 +421,8 @@ class GraphMaker {
     return apart(one, two) && apart(two, one);
   }
 
-  // Where two segments cross. Those that are given do so in the first round: later ones have been bent over each other.
+  // A crossing of two segments. Segments that are given cross in the first round: later ones have been bent over each
+  // other.
   Point<2> CrossingOf(const Fault& fault) const {
     const GraphSegment& s = graph_.segments[fault.segment];
     const GraphSegment& t = graph_.segments[fault.other];
@@ -478,7 +479,9 @@ class GraphMaker {
         return NearSegmentError(described, least_separation_, 0);
       }
       return absl::InvalidArgumentError(
-          absl::StrCat(described, "; segments may meet in common ends alone, or be split there"));
+          absl::StrCat(described,
+                       "; segments may meet in common ends alone, or be split there by the rule of crossings "
+                       "\"split\""));
     }
     return absl::OkStatus();
   }
@@ -511,7 +514,7 @@ class GraphMaker {
     return nearest != kNone ? nearest : AddPoint(p);
   }
 
-  // Splits segments at what lies on them or crosses them. Crossings are taken by their places, and so are points on a
+  // Splits segments at points on them and at crossings. Crossings are taken by their places, and so are points on a
   // segment: their numbers are those of the input, whose order is not to matter.
   absl::Status SplitAt(const std::vector<Fault>& faults) {
     std::vector<std::pair<uint32_t, uint32_t>> splits;   // segment, point

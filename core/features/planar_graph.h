@@ -26,14 +26,14 @@ struct GraphSegment {
   uint32_t b = 0;
   int32_t marker = 0;
   uint32_t source = 0;                  // the first given segment that it is a part of, or a side of the box
-  uint32_t rings = 1;                   // so many ring segments lie on it
+  uint32_t rings = 1;                   // the number of ring segments on it
   uint32_t polygons = OddSets::kEmpty;  // whose rings an odd number of times lie on it: a set of PlanarGraph::polygons
   uint32_t groups = OddSets::kEmpty;    // the same of groups: a set of PlanarGraph::groups
 
   bool IsBoxSide() const { return source >= kBoxSide; }
 };
 
-// What has been changed on the way from the segments that are given to a graph.
+// The changes on the way from the given segments to a graph.
 struct CleaningCounts {
   uint64_t equal_points = 0;        // beyond the first at each place
   uint64_t merged_points = 0;       // that have become one with other coordinates
@@ -49,7 +49,7 @@ struct CleaningCounts {
 // a point on a segment is an end of it; (4) a point is at least the least separation from every segment that it is no
 // end of, and at least the snap distance, if there is one, where both parts of the segment would be shorter than it.
 struct PlanarGraph {
-  std::vector<Point<2>> points;          // those that are given in the order of their first appearance, then others
+  std::vector<Point<2>> points;          // the given ones in the order of their first appearance, then others
   std::vector<uint32_t> point_of_input;  // by given point
   std::vector<uint32_t> input_of_point;  // the first given point there; kNoInput for those made here
   std::vector<GraphSegment> segments;    // by source, then along it from its lower end to its higher one
@@ -68,13 +68,13 @@ struct PlanarGraph {
 // Guarantees: (1) where nothing crosses and nothing is too close, no coordinate is computed: a segment is split only at
 //             points that lie on it exactly; (2) neither the order of segments nor that of points, nor which end comes
 //             first, changes a place, or which segments there are.
-// Complexity: O((n + m) log (n + m)) for most inputs, and what is found. That is so, too, where all segments have a
+// Complexity: O((n + m) log (n + m) + k) for most inputs with k faults. That is so, too, where all segments have a
 //             common end, lie side by side or on a common line.
 // Errors:     INVALID_ARGUMENT, naming segments, points and places: an end that does not exist; markers that differ on
-//             one segment; seeds whose polygons are not there, or not closed; under
-//             kUnion groups whose rings are not closed; and, unless they are to be split,
-//             segments that cross and vertices that are too close; RESOURCE_EXHAUSTED when splitting does not end, or
-//             crossings make more than `max_vertices`; CANCELLED, DEADLINE_EXCEEDED.
+//             one segment; seeds whose polygons are not there, or not closed; under kUnion groups whose rings are not
+//             closed; and, unless they are to be split, segments that cross and vertices that are too close.
+//             RESOURCE_EXHAUSTED when splitting does not end, or crossings make more than `max_vertices`.
+//             CANCELLED, DEADLINE_EXCEEDED.
 // Threads:    uses `threads`, at most as many as the machine has cores.
 // Source:     docs/design/features.md.
 absl::StatusOr<PlanarGraph> MakePlanarGraph(std::span<const double> points, const Features& features, const Box<2>* box,

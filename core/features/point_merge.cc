@@ -1,6 +1,5 @@
 #include "core/features/point_merge.h"
 
-#include <algorithm>
 #include <cstddef>
 #include <limits>
 #include <numeric>
@@ -80,7 +79,7 @@ class TwinMerger {
     return corners;
   }
 
-  // Those of `corners` that may be near another one, by place: of corners that follow each other closely along the
+  // The corners that may be near another one, by place: of corners that follow each other closely along the
   // first axis, those that do so along the second, too.
   absl::StatusOr<std::vector<uint32_t>> Suspects(const std::vector<uint32_t>& corners) const {
     std::vector<uint32_t> suspects;
@@ -143,7 +142,7 @@ class TwinMerger {
   absl::StatusOr<PointMerge> Result() {
     for (uint32_t i = 0; i < becomes_.size(); ++i) {
       WELLSPACE_RETURN_IF_ERROR(CheckAt(i));
-      becomes_[i] = becomes_[becomes_[i]];  // the first that is equal to it, and the one which that becomes
+      becomes_[i] = becomes_[becomes_[i]];  // the first that is equal to it, and then the point that this becomes
     }
     return PointMergeOf(points_, becomes_, context_);
   }

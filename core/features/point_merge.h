@@ -1,4 +1,4 @@
-// Which of the points that are given are one.
+// The merging of given points that are one: equal points, and twins.
 #ifndef WELLSPACE_CORE_FEATURES_POINT_MERGE_H_
 #define WELLSPACE_CORE_FEATURES_POINT_MERGE_H_
 
@@ -14,13 +14,13 @@ namespace wellspace::core {
 
 // Invariants: (1) place_of[inputs[k]] == k; (2) places are in the order in which given points first become them.
 struct PointMerge {
-  std::vector<uint32_t> place_of;  // by given point: the one that it is now, a place in `inputs`
+  std::vector<uint32_t> place_of;  // by given point: the point that it has become, a place in `inputs`
   std::vector<uint32_t> inputs;    // the given points that stay, with the bits they had
-  uint64_t equal = 0;              // others, which are equal to the one that they are now
+  uint64_t equal = 0;              // others, which are equal to the point that they have become
   uint64_t merged = 0;             // others, which have other coordinates
 };
 
-// What comes of it that every given point i becomes `becomes`[i], which becomes itself.
+// The outcome where every given point i becomes `becomes`[i], which becomes itself.
 //
 // Complexity: O(n).
 // Errors:     CANCELLED, DEADLINE_EXCEEDED.

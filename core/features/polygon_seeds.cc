@@ -5,7 +5,6 @@
 #include <numeric>
 #include <set>
 #include <tuple>
-#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
@@ -56,7 +55,7 @@ std::vector<double> AreasOf(const PlanarGraph& graph, std::vector<Side>& sides, 
   return areas;
 }
 
-// Polygons in the order in which they have faces: by area, and those of one area by what they say.
+// Polygons in the order in which they have faces: by area, and those of one area by hole, region and largest area.
 struct Ranks {
   std::vector<uint32_t> rank;      // by seed
   std::vector<uint32_t> seed;      // by rank

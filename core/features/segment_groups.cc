@@ -41,7 +41,7 @@ absl::StatusOr<SegmentGroups> GroupsOfSegments(const Features& features, const R
 
 absl::Status CheckGroupsClosed(std::span<const uint32_t> point_of_input, const Features& features,
                                const SegmentGroups& groups, const RunContext& context) {
-  // Segments by group: those of group g are from first[g] on.
+  // Segments by group: group g begins at first[g].
   std::vector<uint32_t> first(size_t{groups.count()} + 1);
   for (const uint32_t group : groups.of_segment) {
     if (group != OddSets::kEmpty) {

@@ -17,11 +17,11 @@ constexpr int kDepthOfParts = 3;
 
 // Segments side by side are sliced if they are so many times as many as the points among them.
 constexpr size_t kSegmentsPerPoint = 4;
-// Halves that hold more than this share of what was halved together were cut in a bad direction.
+// A direction is bad if both halves together hold more than this many times the segments that were halved.
 constexpr double kMostTogether = 1.25;
 constexpr int kMostSlices = 100;
 
-// What is rounded of coordinates in a box, and much more.
+// The rounding of coordinates in a box, and much more.
 constexpr double kRoom = 0x1p-45;
 
 }  // namespace
@@ -78,7 +78,7 @@ bool SegmentPairs::ForEachGroupOf(const Group& part, Compare compare) const {
       slice.stretches.push_back({segment});
     }
     slice.points = part.points;
-    // What is beyond the square is no matter of this group.
+    // The part beyond the square is no matter of this group.
     for (int axis = 0; axis < 2; ++axis) {
       Line line;
       line.normal[axis] = 1;
@@ -168,7 +168,7 @@ bool SegmentPairs::ForEachGroupOf(Slice slice, Compare compare) const {
     const size_t together = low.stretches.size() + high.stretches.size();
     if (static_cast<double>(together) <= kMostTogether * static_cast<double>(segments.size()) &&
         std::max(low.stretches.size(), high.stretches.size()) < segments.size()) {
-      slice = Slice();  // its room is needed for what it is cut into
+      slice = Slice();  // its room is needed for the halves
       return ForEachGroupOf(std::move(low), compare) && ForEachGroupOf(std::move(high), compare);
     }
   }
@@ -188,7 +188,7 @@ Point<2> SegmentPairs::PlaceOn(uint32_t segment, double share) const {
   return {a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])};
 }
 
-// That of the stretch in the middle, as seen across one of them.
+// The line along the stretch in the middle, as seen across one of them.
 SegmentPairs::Line SegmentPairs::LineAlong(const Slice& slice) const {
   const auto normal_of = [&](const Stretch& stretch) -> Point<2> {
     const Point<2> along =
@@ -210,8 +210,8 @@ SegmentPairs::Line SegmentPairs::LineAlong(const Slice& slice) const {
   return {normal, Dot<2>(normal, PlaceOn(stretch.segment, 0.5 * (stretch.from + stretch.to)))};
 }
 
-// The one that halves the box of the stretches across its longer side; none if that is no wider than what is looked for
-// on both sides.
+// The line that halves the box of the stretches across its longer side; none if that is no wider than four times the
+// reach.
 std::optional<SegmentPairs::Line> SegmentPairs::LineAcross(const Slice& slice) const {
   Box<2> box{{PlaceOn(slice.stretches[0].segment, slice.stretches[0].from)},
              {PlaceOn(slice.stretches[0].segment, slice.stretches[0].from)}};
@@ -232,7 +232,7 @@ std::optional<SegmentPairs::Line> SegmentPairs::LineAcross(const Slice& slice) c
   return line;
 }
 
-// What is on the side of `line` that `sign` tells, or within reach of it.
+// The part on the side of `line` that `sign` tells, or within reach of it.
 SegmentPairs::Slice SegmentPairs::SideOf(const Slice& slice, const Line& line, double sign) const {
   Slice side;
   side.depth = slice.depth + 1;

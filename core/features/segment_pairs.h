@@ -1,4 +1,4 @@
-// Which segments and points of the plane may meet: found by a quadtree over both.
+// The search for segments, and points beside segments, of the plane that may meet: by a quadtree over both.
 #ifndef WELLSPACE_CORE_FEATURES_SEGMENT_PAIRS_H_
 #define WELLSPACE_CORE_FEATURES_SEGMENT_PAIRS_H_
 
@@ -25,7 +25,7 @@ using SegmentEnds = std::array<uint32_t, 2>;
 // within `reach` of each other, are together in some group. Two segments with a common end may be in none.
 //
 // A square of the quadtree is quartered until it holds few features, or segments with a common end alone. One that many
-// segments pass through, side by side, would be quartered until it is narrower than what is between two of them. It is
+// segments pass through, side by side, would be quartered until it is narrower than the gap between two of them. It is
 // halved along one of them instead, which the others do not cross.
 //
 // Thread safety: thread-compatible; const functions may run at once.

@@ -9,10 +9,12 @@
 #include <utility>
 
 #include "core/base/cancellable_sort.h"
+#include "core/base/check_at.h"
 #include "core/base/status_macros.h"
 #include "core/features/angle_order.h"
-#include "core/features/box_tree.h"
+#include "core/features/triangle_crossing.h"
 #include "core/features/union_find.h"
+#include "core/geometry/box_tree.h"
 #include "core/geometry/exact_measure.h"
 #include "core/geometry/vector_product.h"
 
@@ -22,12 +24,7 @@ namespace {
 constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
 constexpr double kSixth = 1.0 / 6;
 
-// A look at the context in a loop that makes short steps, of which this is one.
-absl::Status CheckAt(size_t step, const RunContext& context) {
-  return step % kStepsBetweenChecks == 0 ? context.Check() : absl::OkStatus();
-}
-
-// A sum without what is rounded of its terms' order of size: Neumaier's.
+// Neumaier's compensated sum: rounding errors are summed apart, and added at the end.
 class Sum {
  public:
   void Add(double term) {
@@ -44,7 +41,7 @@ class Sum {
 
 // A ray along an axis towards lower coordinates, from a point that is moved off its place by nothing to speak of:
 // towards another point; less than that down the ray; still less upwards on the second axis, and least on the third. So
-// it meets no edge, and no plane along it, and what else ends in the place is as it is a little beside it.
+// it meets no edge, and no plane along it, and triangles that end in the place are met as they are a little beside it.
 struct Ray {
   Point<3> from;
   Point<3> towards;
@@ -104,7 +101,7 @@ class SolidFinder {
     return absl::OkStatus();
   }
 
-  // Finds the parts that hang together by edges, and what the lowest vertex of each is seen from.
+  // Finds the shells, the parts that hang together by edges, and joins the outside of each to the solid around it.
   absl::Status JoinShells() {
     UnionFind shells(triangle_count());
     for (uint32_t e = 0; e < complex_.edges.size(); ++e) {
@@ -122,7 +119,7 @@ class SolidFinder {
       }
     }
     std::vector<Box<3>> boxes;
-    BoxTree tree;
+    BoxTree<3> tree;
     if (out_.shells > 1) {
       boxes.reserve(triangle_count());
       for (uint32_t t = 0; t < triangle_count(); ++t) {
@@ -132,7 +129,7 @@ class SolidFinder {
         box.Include({complex_.Corner(t, 2), complex_.Corner(t, 2)});
         boxes.push_back(box);
       }
-      WELLSPACE_RETURN_IF_ERROR(tree.Build(boxes, context_));
+      WELLSPACE_RETURN_IF_ERROR(tree.Build(std::move(boxes), context_));
     }
     for (uint32_t t = 0; t < triangle_count(); ++t) {
       if (shells.Find(t) == t) {
@@ -143,8 +140,8 @@ class SolidFinder {
     return absl::OkStatus();
   }
 
-  // Joins what is outside of the shell that begins with `first` with what it lies in.
-  absl::Status JoinShell(uint32_t first, UnionFind& shells, const BoxTree& tree) {
+  // Joins the outside of the shell that begins with `first` with the solid in which that lies.
+  absl::Status JoinShell(uint32_t first, UnionFind& shells, const BoxTree<3>& tree) {
     const uint32_t lowest = complex_.triangles[first][0];
     const Point<3>& v = complex_.points[lowest];
     // The edge from it that is the last clockwise in the projection along the third axis: beyond it is nothing of the
@@ -184,7 +181,7 @@ class SolidFinder {
   }
 
   // The first half-facet that a ray meets.
-  std::optional<HalfFacet> FirstSeen(const Ray& ray, const BoxTree& tree) const {
+  std::optional<HalfFacet> FirstSeen(const Ray& ray, const BoxTree<3>& tree) const {
     const size_t u = ray.second();
     const size_t w = ray.third();
     std::optional<uint32_t> first;
@@ -248,7 +245,7 @@ class SolidFinder {
       }
     }
     // Whether the ray begins above: on the side to which the normal points if the corners are counterclockwise from
-    // there. On the plane what it is moved towards decides, and if that is on it, too, it begins below.
+    // there. On the plane the point that it is moved towards decides, and if that is on it, too, the ray begins below.
     const auto side = [&](const Point<3>& p) {
       return Orientation<3>({complex_.Corner(t, 0), complex_.Corner(t, 1), complex_.Corner(t, 2), p}).sign;
     };
@@ -269,19 +266,7 @@ class SolidFinder {
 
   // kPositive if no corner of `t` is below the plane of `u`, kNegative if none is above, kZero otherwise.
   Sign SideOfTriangle(uint32_t u, uint32_t t, const Ray& ray) const {
-    const Sign turn = TurnOf(u, ray);
-    Sign found = Sign::kZero;
-    for (uint32_t k = 0; k < 3; ++k) {
-      const Sign side =
-          Orientation<3>({complex_.Corner(u, 0), complex_.Corner(u, 1), complex_.Corner(u, 2), complex_.Corner(t, k)})
-              .sign *
-          turn;
-      if (side != Sign::kZero && found != Sign::kZero && side != found) {
-        return Sign::kZero;
-      }
-      found = side != Sign::kZero ? side : found;
-    }
-    return found;
+    return SideOfCorners(complex_.TriangleAt(u), complex_.TriangleAt(t)) * TurnOf(u, ray);
   }
 
   // Where the plane of a triangle is met, and how it rises from there towards where the place is moved, along the
@@ -402,7 +387,7 @@ absl::StatusOr<Solids> FindSolids(const SurfaceComplex& complex, const RunContex
 
 uint64_t SolidsBytes(uint64_t triangles) {
   // Sets of half-facets, their numbers and solids; sets of triangles; boxes and a tree over them.
-  return triangles * (2 * 4 * sizeof(uint32_t) + sizeof(uint32_t) + sizeof(Box<3>)) + BoxTree::Bytes(triangles);
+  return triangles * (2 * 4 * sizeof(uint32_t) + sizeof(uint32_t)) + BoxTree<3>::Bytes(triangles);
 }
 
 }  // namespace wellspace::core

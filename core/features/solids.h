@@ -22,8 +22,8 @@ struct Solids {
   std::vector<uint32_t> solid_of;  // by half-facet
   uint32_t count = 1;              // number 0 is the unbounded one; the others ascend by their lowest vertices
   std::vector<double> volumes;     // by solid; of the unbounded one infinite
-  // Whether an odd number of triangles separates a solid from infinity, by solid. Where ways to it differ, what the
-  // first of them says.
+  // Whether an odd number of triangles separates a solid from infinity, by solid. Where ways to it differ, the first
+  // of them decides.
   std::vector<bool> is_odd;
   uint64_t shells = 0;         // parts of the complex that hang together by edges
   uint64_t membranes = 0;      // triangles with one solid on both sides
@@ -44,7 +44,7 @@ struct Solids {
 // Source:     docs/design/surfaces.md.
 absl::StatusOr<Solids> FindSolids(const SurfaceComplex& complex, const RunContext& context);
 
-// What FindSolids takes at its peak. Unit: bytes.
+// The peak memory of FindSolids. Unit: bytes.
 uint64_t SolidsBytes(uint64_t triangles);
 
 }  // namespace wellspace::core

@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/cancellable_sort.h"
+#include "core/base/check_at.h"
 #include "core/base/status_macros.h"
 #include "core/geometry/exact_measure.h"
 
@@ -16,11 +17,6 @@ namespace {
 
 // Sides of a point that are sorted without a look at the context.
 constexpr size_t kFewSides = 1024;
-
-// A look at the context in a loop that makes short steps, of which this is one.
-absl::Status CheckAt(size_t step, const RunContext& context) {
-  return step % kStepsBetweenChecks == 0 ? context.Check() : absl::OkStatus();
-}
 
 // A triangle on its way into the complex.
 struct GivenTriangle {
@@ -161,7 +157,7 @@ class ComplexMaker {
     return absl::OkStatus();
   }
 
-  // Of the equal triangles from `begin` to `end`, the first one and the first with another marker.
+  // Adds a conflict of the equal triangles from `begin` to `end`: the first one and the first with another marker.
   void AddConflict(size_t begin, size_t end) {
     ++out_.conflict_count;
     if (out_.conflicts.size() == SurfaceComplex::kMostConflicts) {
@@ -234,7 +230,7 @@ class ComplexMaker {
   SurfaceComplex out_;
 };
 
-// Of a point and of a triangle: what is kept, and what is beside it at the peak.
+// The bytes of a point and of a triangle: those kept, and those beside them at the peak.
 constexpr uint64_t kPointBytes = 24 + 4 + 2 * 32 + 4 + 4;
 constexpr uint64_t kTriangleBytes = 20 + 2 * 16 + 12 + 12 + 3 * 8 + 2 * 12 + 2 * 12;
 

@@ -2,6 +2,7 @@
 #ifndef WELLSPACE_CORE_FEATURES_SURFACE_COMPLEX_H_
 #define WELLSPACE_CORE_FEATURES_SURFACE_COMPLEX_H_
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -13,6 +14,7 @@
 #include "core/base/run_context.h"
 #include "core/features/surface_features.h"
 #include "core/geometry/point.h"
+#include "core/geometry/triangle.h"
 
 namespace wellspace::core {
 
@@ -27,7 +29,7 @@ struct PlacedTriangle {
   Point<3> at{};
 };
 
-// What has been changed on the way from the triangles that are given to a complex.
+// The changes on the way from the triangles that are given to a complex.
 struct SurfaceCleaning {
   uint64_t equal_points = 0;     // beyond the first at each place
   uint64_t flat_triangles = 0;   // without an area, dropped
@@ -63,6 +65,15 @@ struct SurfaceComplex {
   static constexpr size_t kMostConflicts = 1000;
 
   const Point<3>& Corner(uint32_t triangle, uint32_t k) const { return points[triangles[triangle][k]]; }
+  Triangle TriangleAt(uint32_t triangle) const {
+    return {Corner(triangle, 0), Corner(triangle, 1), Corner(triangle, 2)};
+  }
+  // The triangle as InOrder has it: points ascend.
+  Triangle InOrderAt(uint32_t triangle) const {
+    const std::array<uint32_t, 3>& corners = triangles[triangle];  // the least one first
+    const auto [low, high] = std::minmax(corners[1], corners[2]);
+    return {points[corners[0]], points[low], points[high]};
+  }
   std::span<const TriangleSide> SidesAt(uint32_t edge) const {
     return {sides.data() + first_side[edge], first_side[edge + 1] - first_side[edge]};
   }
@@ -92,7 +103,7 @@ bool AreCollinear(const Point<3>& a, const Point<3>& b, const Point<3>& c);
 absl::StatusOr<SurfaceComplex> MakeSurfaceComplex(std::span<const double> points, std::span<const uint32_t> place_of,
                                                   const SurfaceFeatures& features, const RunContext& context);
 
-// What MakeSurfaceComplex takes at its peak, beside what it is given. Unit: bytes.
+// The peak memory of MakeSurfaceComplex, beside its input. Unit: bytes.
 uint64_t SurfaceComplexBytes(uint64_t points, uint64_t triangles);
 
 }  // namespace wellspace::core

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/base/cancellable_sort.h"
+#include "core/base/check_at.h"
 #include "core/base/status_macros.h"
 #include "core/features/patch_merging.h"
 #include "core/features/union_find.h"
@@ -17,25 +18,22 @@ namespace wellspace::core {
 namespace {
 
 constexpr double kWeakAngle = 60;    // a crease across which small patches may join, below
+constexpr double kEdgeAngle = 120;   // a crease within a patch that stays, if it is long
 constexpr double kTurnAngle = 40;    // in a corner a curve turns by more
 constexpr double kConeAngle = 300;   // around the tip of a cone is less
 constexpr double kSharpAngle = 180;  // no crease is sharper
 
-// What MergePatches takes.
+// So many times the side of a small patch is long.
+constexpr double kLongEdge = 5;
+
+// The memory of MergePatches.
 constexpr uint64_t kPatchBytes = 96;
 constexpr uint64_t kCreaseBytes = 2 * 48 + sizeof(CommonCrease);
 
+// That of FindLongEdges, by point.
+constexpr uint64_t kLongEdgeBytes = sizeof(double) + sizeof(uint32_t);
+
 constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
-
-// A look at the context in a loop that makes short steps, of which this is one.
-absl::Status CheckAt(size_t step, const RunContext& context) {
-  return step % kStepsBetweenChecks == 0 ? context.Check() : absl::OkStatus();
-}
-
-Point<3> NormalOf(const SurfaceComplex& complex, uint32_t t) {
-  return Cross(Difference<3>(complex.Corner(t, 1), complex.Corner(t, 0)),
-               Difference<3>(complex.Corner(t, 2), complex.Corner(t, 0)));
-}
 
 class CurveFinder {
  public:
@@ -90,9 +88,15 @@ class CurveFinder {
     std::vector<double> areas(out_.patch_count);
     for (uint32_t t = 0; t < complex_.triangles.size(); ++t) {
       WELLSPACE_RETURN_IF_ERROR(CheckAt(t, context_));
-      areas[out_.patch_of[t]] += 0.5 * std::sqrt(NormSq<3>(NormalOf(complex_, t)));
+      areas[out_.patch_of[t]] += AreaOf(complex_.TriangleAt(t));
     }
+    // Most surfaces have few patches; where every triangle is a patch of its own, they take much more than all else.
+    const auto weak = static_cast<uint64_t>(std::count(kinds_.begin(), kinds_.end(), Kind::kWeakCrease));
+    WELLSPACE_RETURN_IF_ERROR(
+        context_.AllowMemory(SurfaceComplexBytes(complex_.points.size(), complex_.triangles.size()) +
+                             areas.size() * kPatchBytes + weak * kCreaseBytes));
     std::vector<CommonCrease> creases;
+    creases.reserve(weak);
     for (uint32_t e = 0; e < kinds_.size(); ++e) {
       WELLSPACE_RETURN_IF_ERROR(CheckAt(e, context_));
       if (kinds_[e] != Kind::kWeakCrease) {
@@ -109,8 +113,6 @@ class CurveFinder {
     if (creases.empty()) {
       return absl::OkStatus();
     }
-    // Of most surfaces a few; where every triangle is a patch of its own, much more than all else takes.
-    WELLSPACE_RETURN_IF_ERROR(context_.AllowMemory(areas.size() * kPatchBytes + creases.size() * kCreaseBytes));
     WELLSPACE_ASSIGN_OR_RETURN(const std::vector<uint32_t> become,
                                MergePatches(areas, creases, min_patch_ * min_patch_, context_));
     std::vector<uint32_t> number(out_.patch_count, kNone);
@@ -123,16 +125,54 @@ class CurveFinder {
     return absl::OkStatus();
   }
 
-  // Leaves the edges that part patches, and borders.
+  // Leaves the edges that part patches, borders, and long sharp edges of a patch that goes around, as at the back of a
+  // wing: no facets would end there.
   absl::Status DropFragments() {
+    WELLSPACE_ASSIGN_OR_RETURN(const std::vector<bool> is_long, FindLongEdges());
     for (uint32_t e = 0; e < kinds_.size(); ++e) {
       WELLSPACE_RETURN_IF_ERROR(CheckAt(e, context_));
-      if (kinds_[e] == Kind::kWeakCrease || kinds_[e] == Kind::kCrease) {
-        const std::span<const TriangleSide> sides = complex_.SidesAt(e);
-        kinds_[e] = PatchAt(sides[0]) != PatchAt(sides[1]) ? Kind::kCrease : Kind::kPlain;
+      if (IsCrease(e)) {
+        kinds_[e] = !IsWithinPatch(e) || (!is_long.empty() && is_long[e]) ? Kind::kCrease : Kind::kPlain;
       }
     }
     return absl::OkStatus();
+  }
+
+  bool IsCrease(uint32_t e) const { return kinds_[e] == Kind::kWeakCrease || kinds_[e] == Kind::kCrease; }
+  bool IsWithinPatch(uint32_t e) const {
+    const std::span<const TriangleSide> sides = complex_.SidesAt(e);
+    return PatchAt(sides[0]) == PatchAt(sides[1]);
+  }
+
+  // Which edges are on a long sharp crease with one patch on both sides; nothing if there is no such edge.
+  absl::StatusOr<std::vector<bool>> FindLongEdges() const {
+    std::vector<uint32_t> sharp;
+    for (uint32_t e = 0; e < kinds_.size(); ++e) {
+      WELLSPACE_RETURN_IF_ERROR(CheckAt(e, context_));
+      if (kinds_[e] == Kind::kCrease && IsWithinPatch(e) && CreaseAngle(complex_, e) > kEdgeAngle) {
+        sharp.push_back(e);
+      }
+    }
+    if (sharp.empty()) {
+      return std::vector<bool>();
+    }
+    WELLSPACE_RETURN_IF_ERROR(
+        context_.AllowMemory(SurfaceComplexBytes(complex_.points.size(), complex_.triangles.size()) +
+                             complex_.points.size() * kLongEdgeBytes + kinds_.size()));
+    UnionFind joined(complex_.points.size());
+    for (const uint32_t e : sharp) {
+      joined.Join(complex_.edges[e][0], complex_.edges[e][1]);
+    }
+    std::vector<double> lengths(complex_.points.size());
+    for (const uint32_t e : sharp) {
+      const auto [a, b] = complex_.edges[e];
+      lengths[joined.Find(a)] += Distance<3>(complex_.points[a], complex_.points[b]);
+    }
+    std::vector<bool> is_long(kinds_.size());
+    for (const uint32_t e : sharp) {
+      is_long[e] = lengths[joined.Find(complex_.edges[e][0])] >= kLongEdge * min_patch_;
+    }
+    return is_long;
   }
 
   bool IsOnCurve(uint32_t e) const { return kinds_[e] != Kind::kPlain; }
@@ -304,8 +344,8 @@ class CurveFinder {
 
 double CreaseAngle(const SurfaceComplex& complex, uint32_t edge) {
   const std::span<const TriangleSide> sides = complex.SidesAt(edge);
-  const Point<3> one = NormalOf(complex, TriangleOf(sides[0]));
-  Point<3> other = NormalOf(complex, TriangleOf(sides[1]));
+  const Point<3> one = NormalOf(complex.TriangleAt(TriangleOf(sides[0])));
+  Point<3> other = NormalOf(complex.TriangleAt(TriangleOf(sides[1])));
   if (complex.RunsUp(sides[0]) == complex.RunsUp(sides[1])) {  // they go against each other
     other = {-other[0], -other[1], -other[2]};
   }

@@ -36,9 +36,11 @@ struct SurfaceCurves {
 double CreaseAngle(const SurfaceComplex& complex, uint32_t edge);
 
 // Finds curves: edges with another number of triangles than two, with two markers, or with a crease angle above
-// `crease_angle`. Patches with an area below the square of `min_patch` then join the neighbour with which they have the
-// longest weak crease in common, below 60 degrees and without a change of markers, the smallest first. Edges whose two
-// triangles are of one patch are dropped: fragments of creases, such as thin triangles make by chance.
+// `crease_angle`. Patches with an area below the square of `min_patch` then join a neighbour, the smallest first. It is
+// the one with which they have the longest weak crease in common, below 60 degrees and without a change of markers.
+// Edges whose two triangles are of one patch are dropped: fragments of creases, such as thin triangles make by chance.
+// But where their normals are more than 120 degrees apart they stay, if so many of them hang together that they are
+// five times as long as `min_patch`: a patch may go around, as that of a wing.
 //
 // Corners are where curves end or branch, where one turns by more than 40 degrees, and where it comes between other
 // patches; and the tips of cones, points on no curve around which the triangles have less than 300 degrees.
@@ -54,7 +56,7 @@ double CreaseAngle(const SurfaceComplex& complex, uint32_t edge);
 absl::StatusOr<SurfaceCurves> FindCurves(const SurfaceComplex& complex, double crease_angle, double min_patch,
                                          const RunContext& context);
 
-// What FindCurves takes at its peak. Unit: bytes.
+// The peak memory of FindCurves. Unit: bytes.
 uint64_t SurfaceCurvesBytes(uint64_t points, uint64_t triangles);
 
 }  // namespace wellspace::core

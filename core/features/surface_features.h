@@ -1,4 +1,4 @@
-// What a domain in space is bounded by and made of, as it is given: triangles, holes and regions.
+// The features of a domain in space, as they are given: triangles, holes and regions.
 #ifndef WELLSPACE_CORE_FEATURES_SURFACE_FEATURES_H_
 #define WELLSPACE_CORE_FEATURES_SURFACE_FEATURES_H_
 
@@ -11,13 +11,17 @@
 
 namespace wellspace::core {
 
-// Which of the solids, into which triangles cut space, are meshed.
+// The rule by which solids, into which triangles cut space, are meshed.
 enum class SolidRule : uint8_t {
-  kEvenOdd,  // those that an odd number of triangles separates from infinity
+  kEvenOdd,  // the places that an odd number of triangles separates from infinity
   kHoles,    // all bounded ones but those with a hole
+  kWinding,  // the places that triangles go around more often than 1/2 times, which need not bound them: a wrap does
 };
 
-// What is said of the solid that a point lies in.
+// The default resolution of a wrap, by the diagonal of the surface's bounding box.
+inline constexpr double kWrapResolution = 0.005;
+
+// A statement on the solid that a point lies in.
 struct SolidSeed {
   Point<3> at{};
   bool is_hole = false;                                         // the solid is not meshed
@@ -31,8 +35,9 @@ struct SurfaceFeatures {
   std::span<const int32_t> markers;   // m, or none: then all are 0
   std::span<const SolidSeed> seeds;
   SolidRule solids = SolidRule::kEvenOdd;
-  double crease_angle = 30;  // between the normals at a crease, at least; 180: none. Unit: degrees
+  double crease_angle = 30;  // less than between the normals at a crease; 180: none. Unit: degrees
   double weld = 0;           // points no farther than this from each other become one; a length
+  double resolution = 0;     // the cell of a wrap; a length, 0: kWrapResolution times the diagonal
   double min_patch = 0;      // patches smaller than its square join a neighbour; a length, 0: 1 % of the diagonal
 
   size_t triangle_count() const { return corners.size() / 3; }

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/base/cancellable_sort.h"
+#include "core/base/check_at.h"
 #include "core/base/status_macros.h"
 #include "core/features/union_find.h"
 #include "core/geometry/box.h"
@@ -18,11 +19,6 @@ namespace {
 
 constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
 constexpr double kTurn = 360;  // degrees
-
-// A look at the context in a loop that makes short steps, of which this is one.
-absl::Status CheckAt(size_t step, const RunContext& context) {
-  return step % kStepsBetweenChecks == 0 ? context.Check() : absl::OkStatus();
-}
 
 class ShapeFinder {
  public:

@@ -1,4 +1,4 @@
-// What a complex of triangles is like as a whole: where it is open or branches, which triangles go the other way, how
+// The shape of a complex of triangles as a whole: where it is open or branches, which triangles go the other way, how
 // sharp it is.
 #ifndef WELLSPACE_CORE_FEATURES_SURFACE_SHAPE_H_
 #define WELLSPACE_CORE_FEATURES_SURFACE_SHAPE_H_
@@ -28,7 +28,7 @@ struct SurfaceShape {
   std::vector<uint32_t> odd_edges;  // of three, five, … triangles
   uint64_t branching_edges = 0;     // of three or more triangles
   // Triangles that would have to be turned, so that two at an edge go the same way; as few as will do. Edges of other
-  // numbers of triangles part what is compared.
+  // numbers of triangles separate the parts that are compared.
   uint64_t flipped_triangles = 0;
   uint32_t first_flipped = 0;  // triangle, if there is one
   uint64_t one_sided = 0;      // parts of which no turning makes that so, as of a Moebius strip
@@ -43,7 +43,7 @@ struct SurfaceShape {
 // Errors:     CANCELLED, DEADLINE_EXCEEDED.
 absl::StatusOr<SurfaceShape> DescribeShape(const SurfaceComplex& complex, const RunContext& context);
 
-// What DescribeShape takes at its peak. Unit: bytes.
+// The peak memory of DescribeShape. Unit: bytes.
 uint64_t SurfaceShapeBytes(uint64_t points, uint64_t triangles);
 
 }  // namespace wellspace::core

@@ -9,6 +9,7 @@
 
 #include "core/geometry/exact_measure.h"
 #include "core/geometry/segment.h"
+#include "core/geometry/triangle.h"
 #include "core/geometry/vector_product.h"
 
 namespace wellspace::core {
@@ -19,14 +20,6 @@ using Triangle = std::array<Point<3>, 3>;
 constexpr double kThird = 1.0 / 3;
 
 Sign SideOfPlane(const Triangle& t, const Point<3>& p) { return Orientation<3>({t[0], t[1], t[2], p}).sign; }
-
-Point<3> Between(const Point<3>& a, const Point<3>& b, double share) {
-  Point<3> p;
-  for (int i = 0; i < 3; ++i) {
-    p[i] = a[i] + share * (b[i] - a[i]);
-  }
-  return p;
-}
 
 // Whether all of `one` lie on one side of a plane through `origin`, and all of `other` on the other side, each farther
 // from it than `least`. `normal` is that of the plane, any vector.
@@ -53,11 +46,8 @@ bool AreApart(const Point<3>& normal, const Point<3>& origin, std::span<const Po
     }
     return sign * sum > reach + 0x1p-50 * magnitude + 0x1p-900;
   };
-  const auto are = [&](double sign) {
-    return std::all_of(one.begin(), one.end(), [&](const Point<3>& p) { return is_beyond(p, sign); }) &&
-           std::all_of(other.begin(), other.end(), [&](const Point<3>& p) { return is_beyond(p, -sign); });
-  };
-  return are(1);
+  return std::all_of(one.begin(), one.end(), [&](const Point<3>& p) { return is_beyond(p, 1); }) &&
+         std::all_of(other.begin(), other.end(), [&](const Point<3>& p) { return is_beyond(p, -1); });
 }
 
 Point<3> Unit(const Point<3>& v) {
@@ -75,7 +65,7 @@ Point<3> Centre(const Triangle& t) {
 
 // The axes of a projection in which a triangle has an area.
 std::pair<size_t, size_t> AxesOf(const Triangle& t) {
-  const Point<3> normal = Cross(Difference<3>(t[1], t[0]), Difference<3>(t[2], t[0]));
+  const Point<3> normal = NormalOf(t);
   size_t along = 0;
   for (size_t axis = 1; axis < 3; ++axis) {
     along = std::abs(normal[axis]) > std::abs(normal[along]) ? axis : along;
@@ -181,7 +171,7 @@ std::optional<Point<3>> SegmentMeets(const Point<3>& a, const Point<3>& b, const
   return Between(a, b, from / (from + to));
 }
 
-// The first of the given distances that is too small, as a contact.
+// The least of the given distances that is too small, as a contact.
 class NearCorner {
  public:
   explicit NearCorner(double least) : least_(least) {}
@@ -220,7 +210,7 @@ bool IsBeyondAPlaneOf(const Triangle& t, const Triangle& u, double least) {
     const Point<3> middle = {from[0] + share * out[0], from[1] + share * out[1], from[2] + share * out[2]};
     return AreApart(out, middle, u, t, least);
   };
-  const Point<3> normal = Cross(Difference<3>(t[1], t[0]), Difference<3>(t[2], t[0]));
+  const Point<3> normal = NormalOf(t);
   if (is_beyond(normal, t[0]) || is_beyond({-normal[0], -normal[1], -normal[2]}, t[0])) {
     return true;
   }
@@ -232,7 +222,7 @@ bool IsBeyondAPlaneOf(const Triangle& t, const Triangle& u, double least) {
   return false;
 }
 
-// Of triangles without a common corner.
+// The contact of triangles without a common corner.
 TriangleContact ContactOfStrangers(const Triangle& t, const Triangle& u, double least) {
   const Point<3> middle = Between(Centre(t), Centre(u), 0.5);
   const Point<3> apart = Difference<3>(Centre(t), Centre(u));
@@ -260,7 +250,7 @@ TriangleContact ContactOfStrangers(const Triangle& t, const Triangle& u, double 
   return near.found();
 }
 
-// Of triangles with the first corner in common, and no other.
+// The contact of triangles with the first corner in common, and no other.
 TriangleContact ContactAtCorner(const Triangle& t, const Triangle& u, double least) {
   const Point<3>& v = t[0];
   const std::array<Point<3>, 2> t_ways = {Unit(Difference<3>(t[1], v)), Unit(Difference<3>(t[2], v))};
@@ -303,12 +293,12 @@ TriangleContact ContactAtCorner(const Triangle& t, const Triangle& u, double lea
   return near.found();
 }
 
-// Of triangles with the first two corners in common.
+// The contact of triangles with the first two corners in common.
 TriangleContact ContactAtSide(const Triangle& t, const Triangle& u, double least) {
   const Point<3> along = Difference<3>(t[1], t[0]);
   const Point<3> t_across = Cross(along, Difference<3>(t[2], t[0]));
   const Point<3> u_across = Cross(along, Difference<3>(u[2], t[0]));
-  // Far from lying on each other, where their directions differ by much more than what is rounded of them.
+  // Far from lying on each other, where their directions differ by much more than their rounding errors.
   const double length = std::sqrt(NormSq<3>(along));
   const double t_length = std::sqrt(NormSq<3>(t_across));
   const double u_length = std::sqrt(NormSq<3>(u_across));

@@ -2,8 +2,8 @@
 
 #include <array>
 #include <boost/multiprecision/cpp_int.hpp>
+#include <cmath>
 #include <cstddef>
-#include <utility>
 
 #include "core/geometry/exact_measure.h"
 
@@ -23,6 +23,9 @@ Sign ProductSign(const Point<3>& a, const Point<3>& b, const Point<3>& c, const 
   if (std::abs(left - right) > 0x1p-50 * (std::abs(left) + std::abs(right)) + 0x1p-960) {
     return left > right ? Sign::kPositive : Sign::kNegative;
   }
+  if ((b[i] == a[i] || d[j] == c[j]) && (b[j] == a[j] || d[i] == c[i])) {
+    return Sign::kZero;  // as of lines along axes, which are common
+  }
   const auto difference = [](double x, double y) -> Rational { return Rational(x) - Rational(y); };
   const Rational exact =
       difference(b[i], a[i]) * difference(d[j], c[j]) - difference(b[j], a[j]) * difference(d[i], c[i]);
@@ -31,7 +34,7 @@ Sign ProductSign(const Point<3>& a, const Point<3>& b, const Point<3>& c, const 
 
 // On which side of the segment from `p` to `q`, looking along it, the line from `a` to `b` passes.
 //
-// The determinant (q - p, a - p, b - p) loses the scalar product of (b - a) x (q - p) with what both ends are moved by.
+// The determinant (q - p, a - p, b - p) loses the scalar product of (b - a) x (q - p) with the shift of both ends.
 Sign SideOfLine(const Point<3>& p, const Point<3>& q, const Point<3>& a, const Point<3>& b) {
   Sign sign = Orientation<3>({p, q, a, b}).sign;
   for (size_t axis = 0; sign == Sign::kZero && axis < 3; ++axis) {
@@ -40,22 +43,8 @@ Sign SideOfLine(const Point<3>& p, const Point<3>& q, const Point<3>& a, const P
   return sign;
 }
 
-// kPositive if corners of `other` are on the positive side of the plane of `triangle` and none is on the other one,
-// kNegative the other way round; kZero if there are some on both sides, or on none.
-Sign SideOfCorners(const Triangle& triangle, const Triangle& other) {
-  Sign found = Sign::kZero;
-  for (const Point<3>& corner : other) {
-    const Sign side = Orientation<3>({triangle[0], triangle[1], triangle[2], corner}).sign;
-    if (side != Sign::kZero && found != Sign::kZero && side != found) {
-      return Sign::kZero;
-    }
-    found = side != Sign::kZero ? side : found;
-  }
-  return found;
-}
-
-// How far along the segment from `p` to `q` the plane of a triangle is met, in its lengths, and how that grows with
-// each coordinate of what both ends are moved by.
+// The place along the segment from `p` to `q` where it meets the plane of a triangle, in its lengths; and the growth of
+// that with each coordinate of the shift of both ends.
 std::array<Rational, 4> MeetingOf(const Triangle& triangle, const Point<3>& p, const Point<3>& q) {
   const auto difference = [](const Point<3>& x, const Point<3>& y) {
     return RationalPoint{Rational(x[0]) - Rational(y[0]), Rational(x[1]) - Rational(y[1]),
@@ -73,11 +62,31 @@ std::array<Rational, 4> MeetingOf(const Triangle& triangle, const Point<3>& p, c
 
 }  // namespace
 
+Sign SideOfCorners(const Triangle& triangle, const Triangle& other) {
+  Sign found = Sign::kZero;
+  for (const Point<3>& corner : other) {
+    const Sign side = Orientation<3>({triangle[0], triangle[1], triangle[2], corner}).sign;
+    if (side != Sign::kZero && found != Sign::kZero && side != found) {
+      return Sign::kZero;
+    }
+    found = side != Sign::kZero ? side : found;
+  }
+  return found;
+}
+
 Sign MovedSide(const Triangle& triangle, const Point<3>& p) {
+  // Across an axis planes are common, and so are points on them up to rounding.
+  for (size_t axis = 0; axis < 3; ++axis) {
+    if (triangle[0][axis] == triangle[1][axis] && triangle[0][axis] == triangle[2][axis]) {
+      const Sign turn = ProductSign(triangle[0], triangle[1], triangle[0], triangle[2], axis);
+      return p[axis] < triangle[0][axis] ? -turn : turn;
+    }
+  }
   Sign sign = Orientation<3>({triangle[0], triangle[1], triangle[2], p}).sign;
-  // The determinant grows by the coordinates of the normal.
+  // The determinant grows by the coordinates of the normal, which tell how the triangle turns, seen along an axis.
   for (size_t axis = 0; sign == Sign::kZero && axis < 3; ++axis) {
-    sign = ProductSign(triangle[0], triangle[1], triangle[0], triangle[2], axis);
+    const auto seen = [axis](const Point<3>& q) { return Point<2>{q[(axis + 1) % 3], q[(axis + 2) % 3]}; };
+    sign = Orientation<2>({seen(triangle[0]), seen(triangle[1]), seen(triangle[2])}).sign;
   }
   return sign;
 }
@@ -96,8 +105,8 @@ bool Crosses(const Triangle& triangle, const Point<3>& p, Sign side_of_p, const 
 }
 
 bool IsCrossedBefore(const Triangle& one, const Triangle& other, const Point<3>& p, const Point<3>& q) {
-  // Where all of one triangle is on one side of the plane of the other, no division is needed: the plane of what comes
-  // first parts the rest from p.
+  // Where all of one triangle is on one side of the plane of the other, no division is needed: the plane of the one
+  // that comes first parts the other from p.
   if (const Sign side = SideOfCorners(one, other); side != Sign::kZero) {
     return side != MovedSide(one, p);
   }

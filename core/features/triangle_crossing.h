@@ -18,9 +18,16 @@ namespace wellspace::core {
 // Complexity: O(1).
 Sign MovedSide(const Triangle& triangle, const Point<3>& p);
 
+// kPositive if corners of `other` are on the positive side of the plane of `triangle` and none is on the other one,
+// kNegative the other way round; kZero if there are some on both sides, or on none. Nothing is moved.
+//
+// Guarantees: exact.
+// Complexity: O(1).
+Sign SideOfCorners(const Triangle& triangle, const Triangle& other);
+
 // Whether the segment from `p` to `q` crosses a triangle, when it is known on which side of the plane its ends are.
 //
-// REQUIRES:   as MovedSide; side_of_p and side_of_q are what MovedSide says.
+// REQUIRES:   as MovedSide; side_of_p and side_of_q are results of MovedSide.
 // Guarantees: (1) exact; (2) of triangles around a common edge that a segment passes, either no two in turn are
 //             crossed, or both: nothing leaks, and nothing is crossed twice.
 // Complexity: O(1).

@@ -21,7 +21,7 @@ namespace {
 
 constexpr size_t kComparedTogether = 12;
 constexpr int kDepthOfParts = 6;
-// What is rounded of coordinates, and much more; a share of them.
+// The rounding of coordinates, and much more; a share of them.
 constexpr double kRoom = 0x1p-45;
 constexpr int kMostDepth = 400;
 // Pairs of a part, after which it is given up.
@@ -141,7 +141,7 @@ class PairFinder {
     pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
   }
 
-  // Looks at a group, and at what it is cut into; with a stack of its own.
+  // Looks at a group, and at the groups that it is cut into; with a stack of its own.
   void Search(Group&& part, TrianglePairs& found) const {
     std::vector<Group> left;
     left.push_back(std::move(part));
@@ -160,7 +160,7 @@ class PairFinder {
         Compare(group.triangles, found);
         continue;
       }
-      group = Group();  // its room is needed for what it is cut into
+      group = Group();  // its room is needed for its halves
       for (Group& half : halves) {
         if (half.triangles.size() > 1) {
           left.push_back(std::move(half));
@@ -270,7 +270,7 @@ class PairFinder {
     return CutTowards(complex_.points[*corner], fan, halves);
   }
 
-  // Cuts off half of what the box has beyond `corner`, or beyond its own point that is nearest to that, on the side
+  // Cuts off half of the part of the box beyond `corner`, or beyond its own point that is nearest to that, on the side
   // where it reaches farthest; false if nothing is left to cut.
   bool CutTowards(const Point<3>& corner, const Group& fan, std::array<Group, 2>& halves) const {
     Point<3> at;
@@ -324,7 +324,7 @@ class PairFinder {
   }
 
   TriangleCorners CornersOf(uint32_t triangle) const {
-    return {complex_.triangles[triangle], {At(triangle, 0), At(triangle, 1), At(triangle, 2)}};
+    return {complex_.triangles[triangle], complex_.TriangleAt(triangle)};
   }
 
   // Whether all triangles have a corner in common, and no side across from it comes near the box.
@@ -363,7 +363,7 @@ class PairFinder {
   }
 
   bool Misses(uint32_t triangle, const Box<3>& box) const {
-    return SurelyMissesByPlanes({At(triangle, 0), At(triangle, 1), At(triangle, 2)}, box);
+    return SurelyMissesByPlanes(complex_.TriangleAt(triangle), box);
   }
 
   // Cuts a group into two that together hold all that it can have; false where no cut is good.
@@ -386,7 +386,7 @@ class PairFinder {
     double room = 0;
     Box<3> low{};
     Box<3> high{};
-    Box<3> wide_low{};  // with room for what is rounded
+    Box<3> wide_low{};  // with room for rounding
     Box<3> wide_high{};
   };
   struct Reach {
@@ -404,9 +404,9 @@ class PairFinder {
     return reach;
   }
 
-  // The cuts across each axis, at the middle of what the box has of the triangles.
+  // The cuts across each axis, at the mean middle of the parts of the triangles' boxes in that of the group.
   std::array<AxisCut, 3> CutsOf(const Group& group) const {
-    // What of their boxes is in that of the group.
+    // The part of their boxes in that of the group.
     Box<3> tight = group.box;
     Point<3> middle{};
     Box<3> around{group.box.high, group.box.low};

@@ -31,18 +31,18 @@ struct TrianglePairs {
 // A box around the triangles is halved, where that parts them best, until it holds few of them, or triangles with a
 // common corner alone whose sides across from that are elsewhere: if two of those met, they would do so there, too.
 // Where halving would not part them, as it does not for sheets and strips that lie slanting side by side, a plane along
-// one of them does. Fans, which nothing parts at their common corner, are compared with what is beside them, and the
-// box is cut towards that corner.
+// one of them does. Fans, which nothing parts at their common corner, are compared with the triangles beside them, and
+// the box is cut towards that corner.
 //
-// Guarantees: neither threads, nor the order in which triangles and points were given, change what is found.
+// Guarantees: neither threads, nor the order in which triangles and points were given, change the result.
 // Complexity: O(m log m + k) for most complexes, k pairs whose boxes meet; fans, sheets and strips side by side are
-//             such. What is kept is bounded.
+//             such. The memory is bounded.
 // Errors:     CANCELLED, DEADLINE_EXCEEDED.
 // Threads:    uses `threads`, at most as many as the machine has cores.
 absl::StatusOr<TrianglePairs> FindTrianglePairs(const SurfaceComplex& complex, double least_separation, int threads,
                                                 const RunContext& context);
 
-// What FindTrianglePairs takes. Unit: bytes.
+// The memory of FindTrianglePairs. Unit: bytes.
 uint64_t TrianglePairsBytes(uint64_t triangles);
 
 }  // namespace wellspace::core

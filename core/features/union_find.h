@@ -15,9 +15,16 @@ namespace wellspace::core {
 class UnionFind {
  public:
   // The sets {0}, …, {count - 1}.
-  explicit UnionFind(size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0); }
+  explicit UnionFind(size_t count = 0) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0); }
 
-  // Which number stands for the set of `i`.
+  size_t size() const { return parent_.size(); }
+  // Adds one more set, and returns its number, which is the next.
+  uint32_t Add() {
+    parent_.push_back(static_cast<uint32_t>(parent_.size()));
+    return parent_.back();
+  }
+
+  // The number that stands for the set of `i`.
   //
   // Complexity: O(log n), amortised.
   uint32_t Find(uint32_t i) {

@@ -1,4 +1,4 @@
-// What is asked of the simplices of a mesh.
+// The demands on the simplices of a mesh.
 #ifndef WELLSPACE_CORE_GEOMETRY_CRITERION_H_
 #define WELLSPACE_CORE_GEOMETRY_CRITERION_H_
 
@@ -10,9 +10,9 @@
 
 namespace wellspace::core {
 
-// What every simplex has to be.
+// The property that every simplex has to have.
 enum class Criterion {
-  kRadiusEdge,  // circumradius <= rho * (its shortest edge); what Ruppert, Shewchuk, Triangle and TetGen promise
+  kRadiusEdge,  // circumradius <= rho * (its shortest edge); the promise of Ruppert, Shewchuk, Triangle and TetGen
   kWellSpaced,  // [HT08]'s: no node of a vertex's Voronoi cell is farther from it than rho * (distance to its nearest
                 // neighbour); stronger, and about two and a half times as many vertices
 };
@@ -25,7 +25,7 @@ struct SizeBox {
   double max_circumradius = 0;
 };
 
-// What a size says.
+// The length that a size bounds.
 enum class SizeMeasure {
   kCircumradius,  // no simplex has a larger one
   kEdgeLength,    // edges have about this length, on average
@@ -52,8 +52,8 @@ inline constexpr double kDefaultSampleGradation = 0.3;
 // REQUIRES:   kMinDimension <= dimension <= kMaxDimension.
 // Source:     docs/design/refine.md, sizes.
 inline double CircumradiusOf(double edge_length, int dimension) {
-  // A regular simplex has sqrt(d / (2 (d + 1))); those of a mesh are smaller than the bound allows, and have shorter
-  // edges: 1.27 times as much in 2-D, 1.22 times in 3-D.
+  // A regular simplex has sqrt(d / (2 (d + 1))); simplices of a mesh are smaller than the bound allows, and have
+  // shorter edges: 1.27 times as much in 2-D, 1.22 times in 3-D.
   constexpr std::array<double, kMaxDimension + 1> kPerEdge = {0, 0, 0.733, 0.747, 0.76, 0.83, 0.83};
   return kPerEdge[dimension] * edge_length;
 }

@@ -159,7 +159,7 @@ std::optional<Sign> FilterOrientation(const Simplex<D>& simplex) {
                      D + ExpansionRoundings(D));
 }
 
-// The same in the plane without scaling, where the sign is clear, and nothing that counts underflows or overflows.
+// The orientation in the plane without scaling, where the sign is clear, and nothing that counts is out of range.
 std::optional<Sign> GlanceOrientation(const Simplex<2>& simplex) {
   const double left = (simplex[1][0] - simplex[0][0]) * (simplex[2][1] - simplex[0][1]);
   const double right = (simplex[1][1] - simplex[0][1]) * (simplex[2][0] - simplex[0][0]);
@@ -167,7 +167,7 @@ std::optional<Sign> GlanceOrientation(const Simplex<2>& simplex) {
   const double permanent = std::abs(left) + std::abs(right);
   // Two roundings of differences, one of a product, and one of their difference, each 2^-53: less than half of this.
   constexpr double kRoundings = 0x1p-50;
-  constexpr double kLeast = 0x1p-900;  // beside it what underflows is nothing
+  constexpr double kLeast = 0x1p-900;  // beside it underflow does not count
   if (!(std::abs(determinant) > kRoundings * permanent && permanent > kLeast &&
         permanent < std::numeric_limits<double>::infinity())) {
     return std::nullopt;
@@ -175,7 +175,7 @@ std::optional<Sign> GlanceOrientation(const Simplex<2>& simplex) {
   return determinant > 0 ? Sign::kPositive : Sign::kNegative;
 }
 
-// The same in space.
+// The orientation in space, likewise.
 std::optional<Sign> GlanceOrientation(const Simplex<3>& simplex) {
   const Point<3> a = Difference<3>(simplex[1], simplex[0]);
   const Point<3> b = Difference<3>(simplex[2], simplex[0]);
@@ -192,7 +192,7 @@ std::optional<Sign> GlanceOrientation(const Simplex<3>& simplex) {
   }
   // Three roundings of differences, two of products, one of a difference and two of sums: half of this.
   constexpr double kRoundings = 0x1p-49;
-  constexpr double kLeast = 0x1p-800;  // beside it, and beside so much of a factor, what underflows is nothing
+  constexpr double kLeast = 0x1p-800;  // beside it, and beside so much of a factor, underflow does not count
   if (!(std::abs(determinant) > kRoundings * permanent && permanent > kLeast && permanent > kLeast * size &&
         permanent < std::numeric_limits<double>::infinity())) {
     return std::nullopt;

@@ -40,7 +40,7 @@ class PointGrid {
   void ForEachNear(const Point<D>& p, F f) const {
     const Point<D> lines = Lines(p);
     Key key = KeyOf(lines);
-    std::array<int64_t, D> beside;  // what is within reach lies in this column or in that one
+    std::array<int64_t, D> beside;  // points within reach lie in this column or in that one
     for (int i = 0; i < D; ++i) {
       beside[i] = lines[i] - std::floor(lines[i]) < 0.5 ? -1 : 1;
     }

@@ -408,7 +408,7 @@ BigRows<D> ToBigRows(const Point<D>& site, const std::array<PlaneSource<D>, D>& 
 
 namespace {
 
-// By all stages but the first, which is not to make room for what these need.
+// Decides by all stages but the first, in a function of its own: the first is not to reserve stack for long integers.
 template <int D>
 [[gnu::noinline]] ExactDecision DecideByLongIntegers(const Differences<D>& differences, const Point<D>& site,
                                                      const std::array<PlaneSource<D>, D>& planes, const Point<D>& u,
@@ -435,7 +435,7 @@ ExactDecision DecideByStages(const Point<D>& site, const std::array<PlaneSource<
     const auto minors = MinorsOf<WordRing<D>, D>(rows.normals);
     bool is_exact = true;
     for (int j = 0; j < D; ++j) {
-      is_exact &= (unfit_walls >> j & 1) == 0 || minors[D - j] == 0;  // what it is multiplied by
+      is_exact &= (unfit_walls >> j & 1) == 0 || minors[D - j] == 0;  // unless its factor is 0
     }
     if (is_exact) {
       return Decide<WordRing<D>, D>(site, planes, u, rule, rows, minors);

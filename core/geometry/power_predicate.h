@@ -24,7 +24,7 @@ struct PlaneSource {
   bool IsWall() const { return axis >= 0; }
 };
 
-// What becomes of exact ties.
+// The treatment of exact ties.
 enum class TieRule {
   kKeep,     // a node on the bisector stays; for cells that stand alone
   kPerturb,  // decided by a symbolic perturbation of the vertices' weights, the same for every site; for stars that
@@ -59,8 +59,8 @@ struct ExactDecision {
 // The perturbation gives vertex k the weight W_k = eps^(rank), rank by coordinates, lexicographically greatest first,
 // so that c_j becomes (|w_j|^2 + W_site - W_j) / 2. g is linear in the weights: with w_u = sum_j lambda_j n_j, 2 g
 // gains W_u - sum_j lambda_j W_j + (sum_j lambda_j - 1) W_site over the bisectors j, and the first coefficient in the
-// order of ranks that is not zero decides; that of W_u is 1, so one always does. Coordinates are not touched: what is
-// coplanar stays so.
+// order of ranks that is not zero decides; that of W_u is 1, so one always does. Coordinates are not touched: coplanar
+// points stay so.
 //
 // Laws:       (1) antisymmetric in orientation: the order of `planes` does not matter; (2) scaling by powers of two and
 //             translations that are exact do not change the result; (3) with kPerturb the result is never kZero.
@@ -70,7 +70,7 @@ struct ExactDecision {
 //             them (3-D: 0.16 us, 6-D: 2.7 us).
 // Errors:     none.
 // Source:     ours; the determinant is that of the power test of regular triangulations. docs/design/geometry.md has
-//             the bounds and what was measured.
+//             the bounds and the measurements.
 template <int D>
 ExactDecision DecideCut(const Point<D>& site, const std::array<PlaneSource<D>, D>& planes, const Point<D>& u,
                         TieRule rule);

@@ -32,14 +32,14 @@ inline Box<2> BoxOfEnds(const Point<2>& a, const Point<2>& b) {
   return {{std::min(a[0], b[0]), std::min(a[1], b[1])}, {std::max(a[0], b[0]), std::max(a[1], b[1])}};
 }
 
-// Whether the segment from `a` to `b` surely has no point in `box`, which has a little room around it for what is
-// rounded.
+// Whether the segment from `a` to `b` surely has no point in `box`, which has a little room around it for rounding
+// errors.
 inline bool SurelyMisses(const Point<2>& a, const Point<2>& b, const Box<2>& box) {
   const Box<2> own = BoxOfEnds(a, b);
   if (own.low[0] > box.high[0] || own.high[0] < box.low[0] || own.low[1] > box.high[1] || own.high[1] < box.low[1]) {
     return true;
   }
-  // The corners of the box lie on one side of the line, and farther from it than what is rounded.
+  // The corners of the box lie on one side of the line, and farther from it than rounding errors.
   const Point<2> along = Difference<2>(b, a);
   const Point<2> centre = {0.5 * (box.low[0] + box.high[0]) - a[0], 0.5 * (box.low[1] + box.high[1]) - a[1]};
   const double half_x = 0.5 * (box.high[0] - box.low[0]);

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <limits>
+#include <vector>
 
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
@@ -22,6 +24,58 @@ inline Box<3> BoxOfTriangle(const Triangle& triangle) {
   return box;
 }
 
+// The same triangle, whichever way it goes and whichever corner comes first: results computed of it are then alike to
+// the bit.
+inline Triangle InOrder(Triangle triangle) {
+  std::sort(triangle.begin(), triangle.end());
+  return triangle;
+}
+
+// A vector across a triangle, twice as long as its area: from where it points, the corners go counterclockwise.
+inline Point<3> NormalOf(const Triangle& triangle) {
+  return Cross(Difference<3>(triangle[1], triangle[0]), Difference<3>(triangle[2], triangle[0]));
+}
+inline double AreaOf(const Triangle& triangle) { return 0.5 * std::sqrt(NormSq<3>(NormalOf(triangle))); }
+
+// The circumradius of a triangle with three edges of length 1.
+inline constexpr double kRadiusPerEdge = 0.57735026918962573;
+
+// The point at `share` of the way from `a` to `b`; rounded.
+inline Point<3> Between(const Point<3>& a, const Point<3>& b, double share) {
+  return {a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]), a[2] + share * (b[2] - a[2])};
+}
+
+// The centroid of a triangle; rounded.
+inline Point<3> MiddleOf(const Triangle& triangle) {
+  const auto& [a, b, c] = triangle;
+  Point<3> middle;
+  for (int axis = 0; axis < 3; ++axis) {
+    middle[axis] = a[axis] + ((b[axis] - a[axis]) + (c[axis] - a[axis])) / 3;
+  }
+  return middle;
+}
+
+// The longest edge of a triangle: that from corner `k` to the next one; of equal ones the first.
+struct LongestEdge {
+  size_t k = 0;
+  double length_sq = 0;
+};
+inline LongestEdge LongestEdgeOf(const Triangle& triangle) {
+  LongestEdge longest;
+  for (size_t k = 0; k < 3; ++k) {
+    const double length_sq = DistanceSq<3>(triangle[k], triangle[(k + 1) % 3]);
+    longest = length_sq > longest.length_sq ? LongestEdge{k, length_sq} : longest;
+  }
+  return longest;
+}
+
+// Puts the halves of a triangle, cut across its edge from corner `k`, into `pieces`.
+inline void Bisect(const Triangle& triangle, size_t k, std::vector<Triangle>& pieces) {
+  const Point<3> middle = Between(triangle[k], triangle[(k + 1) % 3], 0.5);
+  pieces.push_back(InOrder({triangle[k], middle, triangle[(k + 2) % 3]}));
+  pieces.push_back(InOrder({middle, triangle[(k + 1) % 3], triangle[(k + 2) % 3]}));
+}
+
 // Whether two closed boxes have no common point; exact.
 inline bool AreApart(const Box<3>& a, const Box<3>& b) {
   for (int axis = 0; axis < 3; ++axis) {
@@ -32,8 +86,8 @@ inline bool AreApart(const Box<3>& a, const Box<3>& b) {
   return false;
 }
 
-// Whether the convex hull of `corners` surely has no point in `box`, of which some plane across `axis` would have to
-// tell. Differences are taken from the middle of the box, and what they and the products round is allowed for.
+// Whether the convex hull of the corners surely has no point in the box, as far as planes across `axis` tell. Seen from
+// the middle of the box; `rounding` allows for the differences from there and for the products.
 template <size_t kCorners>
 inline bool IsParted(const std::array<Point<3>, kCorners>& from_middle, const Point<3>& half, double rounding,
                      const Point<3>& axis) {
@@ -81,10 +135,10 @@ inline std::array<Point<3>, 3> AcrossAxes(const Point<3>& edge) {
 
 // Whether the closed triangle surely has no point in the closed box, as far as its own plane and the planes along its
 // sides and across it tell: four axes of thirteen. False where rounding leaves a doubt, also of needles, whose planes
-// are turned by what is rounded: each axis is taken as it is, and all corners are looked at.
+// are turned by rounding: each axis is taken as it is, and all corners are looked at.
 inline bool SurelyMissesByPlanes(const Triangle& triangle, const Box<3>& box) {
   const SeenFromBox<3> seen(triangle, box);
-  const Point<3> normal = Cross(Difference<3>(triangle[1], triangle[0]), Difference<3>(triangle[2], triangle[0]));
+  const Point<3> normal = NormalOf(triangle);
   if (seen.IsPartedBy(normal)) {
     return true;
   }
@@ -120,7 +174,7 @@ inline bool SurelyMisses(const Triangle& triangle, const Box<3>& box) {
   return false;
 }
 
-// The same for the segment from `a` to `b`.
+// SurelyMisses for the segment from `a` to `b`.
 inline bool SurelyMisses(const Point<3>& a, const Point<3>& b, const Box<3>& box) {
   Box<3> own{a, a};
   own.Include({b, b});
@@ -139,9 +193,7 @@ inline bool SurelyMisses(const Point<3>& a, const Point<3>& b, const Box<3>& box
 inline Point<3> NearestPoint(const Triangle& triangle, const Point<3>& p) {
   const auto [a, b, c] = triangle;
   const auto between = [](const Point<3>& from, const Point<3>& to, double t) {
-    const double share = std::clamp(t, 0.0, 1.0);
-    return Point<3>{from[0] + share * (to[0] - from[0]), from[1] + share * (to[1] - from[1]),
-                    from[2] + share * (to[2] - from[2])};
+    return Between(from, to, std::clamp(t, 0.0, 1.0));
   };
   const Point<3> ab = Difference<3>(b, a);
   const Point<3> ac = Difference<3>(c, a);

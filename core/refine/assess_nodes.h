@@ -10,7 +10,7 @@
 
 namespace wellspace::core {
 
-// What the walls of a cell, faces of the box or segments, leave of a node. It asks for nothing with the default.
+// The verdict of the walls of a cell, faces of the box or segments, on a node. It asks for nothing with the default.
 template <typename Rank>
 struct NodeVerdict {
   double bound_sq = Assessment::kNone;  // the squared distance from the site that it exceeds; kNone: it exceeds none
@@ -20,7 +20,7 @@ struct NodeVerdict {
   Rank rank{};                          // of nodes with one bound the one of the largest rank comes first
 };
 
-// Assesses the nodes of `cell` by what look(node) says of each, a NodeVerdict; look may note more in the result. Each
+// Assesses the nodes of `cell` by look(node), the NodeVerdict of each; look may note more in the result. Each
 // node has a bound of its own; its edge is bound / rho. Only nodes of edges up to `edge_limit_sq` are to be repaired.
 //
 // Complexity: O(nodes), and look.

@@ -1,11 +1,9 @@
 #include "core/refine/assessment.h"
 
 #include <algorithm>
-#include <cmath>
-#include <tuple>
 
 #include "core/base/dimensions.h"
-#include "core/refine/assess_nodes.h"
+#include "core/refine/assess_in_box.h"
 
 namespace wellspace::core {
 namespace {
@@ -25,68 +23,17 @@ double ShortestEdgeSq(const Polytope<D>& cell) {
   return shortest;
 }
 
-// Whether a node is on bisectors alone and near enough for their edges, and for edges up to `most_sq`: so are most
-// nodes. Without a branch, which could not be predicted.
+// The bounds of all nodes in the box.
 template <int D>
-bool IsPlainlyGood(const Polytope<D>& cell, const CellNode<D>& node, double rho_sq, double most_sq) {
-  bool is_on_wall = false;
-  for (const uint16_t index : node.planes) {
-    const Plane<D>& plane = cell.plane(index);
-    is_on_wall |= plane.kind != PlaneKind::kBisector;
-    most_sq = std::min(most_sq, 2 * plane.offset);
-  }
-  return !is_on_wall & (node.radius_sq <= rho_sq * most_sq);
-}
+struct BoxBounds {
+  double rho_sq = 0;
+  bool has_sizes = false;
+  const SizeField<D>& sizes;
+  SizeHint hint{};
 
-// What the planes of a node tell of it.
-struct NodePlanes {
-  double edge_sq = Assessment::kNone;  // the shortest of its edges
-  int edge_plane = -1;                 // its bisector
-  VertexId generator = kNoVertex;      // and its other end
-  bool on_face = false;                // of the box that the site is not on
-  bool on_own_face = false;            // that it is on
-};
-
-// Notes in `result` whether the cell is clipped there, and a face that it touches there if that is nearer than
-// `nearest_face`.
-template <int D>
-NodePlanes LookAtPlanes(const Polytope<D>& cell, const CellNode<D>& node, FaceMask site_faces, double& nearest_face,
-                        Assessment& result) {
-  NodePlanes found;
-  for (const uint16_t index : node.planes) {
-    const Plane<D>& plane = cell.plane(index);
-    if (plane.kind == PlaneKind::kBisector) {
-      if (2 * plane.offset < found.edge_sq || (2 * plane.offset == found.edge_sq && plane.vertex < found.generator)) {
-        found.generator = plane.vertex;
-        found.edge_sq = 2 * plane.offset;
-        found.edge_plane = index;
-      }
-    } else if (plane.kind == PlaneKind::kClip) {
-      result.is_clipped = true;
-    } else if (((site_faces >> plane.face) & 1) != 0) {
-      found.on_own_face = true;
-    } else {
-      found.on_face = true;
-      const double distance = std::abs(plane.offset);
-      if (distance < nearest_face || (distance == nearest_face && plane.face < result.encroached_face)) {
-        nearest_face = distance;
-        result.encroached_face = plane.face;
-      }
-    }
-  }
-  return found;
-}
-
-// Decides between bad nodes with one bound by what they are, whatever their numbers: the farther comes first.
-template <int D>
-struct NodeRank {
-  const CellNode<D>* node = nullptr;
-  VertexId generator = kNoVertex;  // the nearest
-
-  bool operator<(const NodeRank& other) const {
-    return std::tie(node->radius_sq, node->x, other.generator) <
-           std::tie(other.node->radius_sq, other.node->x, generator);
-  }
+  double RhoSq(const CellNode<D>& /*node*/) const { return rho_sq; }
+  bool HasSizes(const CellNode<D>& /*node*/) const { return has_sizes; }
+  double SizeSq(const CellNode<D>& /*node*/, const Point<D>& x, double most) { return sizes.AtSq(x, most, &hint); }
 };
 
 }  // namespace
@@ -94,40 +41,10 @@ struct NodeRank {
 template <int D>
 Assessment Assess(const Polytope<D>& cell, FaceMask site_faces, const MeshCriteria<D>& criteria, double edge_limit_sq) {
   Assessment result;
-  double nearest_face = Assessment::kNone;
   const double rho_sq = criteria.rho * criteria.rho;
-  const bool has_sizes = !criteria.sizes.IsUnbounded();
-  SizeHint hint;
   const double cell_edge_sq = criteria.criterion == Criterion::kWellSpaced ? ShortestEdgeSq(cell) : Assessment::kNone;
-  const auto look = [&](const CellNode<D>& node) -> NodeVerdict<NodeRank<D>> {
-    result.radius_sq = std::max(result.radius_sq, node.radius_sq);
-    if (!has_sizes && IsPlainlyGood(cell, node, rho_sq, cell_edge_sq)) {
-      return {};
-    }
-    const auto [edge_sq, edge_plane, generator, on_face, on_own_face] =
-        LookAtPlanes(cell, node, site_faces, nearest_face, result);
-    if (on_face) {
-      return {};
-    }
-    double bound_sq = rho_sq * std::min(edge_sq, cell_edge_sq);
-    bool is_too_large = false;
-    if (node.radius_sq <= bound_sq) {
-      bound_sq = Assessment::kNone;
-    }
-    if (has_sizes && !on_own_face) {
-      Point<D> x = cell.site();
-      for (int k = 0; k < D; ++k) {
-        x[k] += node.x[k];
-      }
-      const double size_sq = criteria.sizes.AtSq(x, std::min(node.radius_sq, bound_sq), &hint);
-      if (node.radius_sq > size_sq && size_sq < bound_sq) {
-        bound_sq = size_sq;
-        is_too_large = true;
-      }
-    }
-    return {bound_sq, is_too_large, on_own_face, edge_plane, {&node, generator}};
-  };
-  AssessNodes(cell, rho_sq, edge_limit_sq, look, result);
+  BoxBounds<D> bounds{rho_sq, !criteria.sizes.IsUnbounded(), criteria.sizes};
+  AssessInBox<D>(cell, site_faces, rho_sq, cell_edge_sq, edge_limit_sq, bounds, result);
   return result;
 }
 

@@ -1,5 +1,5 @@
-// What is wrong with a clipped Voronoi cell, as the nodes tell. StepRules::AssessCell asks for it in every step of a
-// vertex; what becomes of it is PendingVertices' and StepRules::NextRequest's to say.
+// The faults of a clipped Voronoi cell, as the nodes tell. StepRules::AssessCell asks for it in every step of a
+// vertex; its future is PendingVertices' and StepRules::NextRequest's to say.
 #ifndef WELLSPACE_CORE_REFINE_ASSESSMENT_H_
 #define WELLSPACE_CORE_REFINE_ASSESSMENT_H_
 

@@ -1,4 +1,4 @@
-// What a domain is to the refinement, and the domain of a cloud: the box.
+// The interface of a domain to the refinement, and the domain of a cloud: the box.
 #ifndef WELLSPACE_CORE_REFINE_BOX_DOMAIN_H_
 #define WELLSPACE_CORE_REFINE_BOX_DOMAIN_H_
 
@@ -17,14 +17,14 @@
 
 namespace wellspace::core {
 
-// A domain is what is meshed of the box of a structure. Refinement and Rounds are templates on it: what they have to
-// know of it they ask by the names below, and what a domain does not need costs it nothing. A kind of domain is a
-// folder beside core/refine/plane, and a line where refine.cc and rounds.cc are instantiated.
+// A domain is the meshed part of the box of a structure. Refinement and Rounds are templates on it, and know it by the
+// names below alone; a domain pays for none that it does not need. A kind is a folder beside core/refine/plane, its
+// name where refine.cc, rounds.cc and mesher_of.cc are instantiated, its MesherOf, and a branch of Mesher::Create.
 //
 //   kDimension         int: of its points.
-//   Place              What is known of a new vertex beside its position; Nowhere shows the functions.
+//   Place              The place of a new vertex, beside its position; Nowhere shows the functions.
 //   Request            InsertionRequest<kDimension, Place>: an insertion that a cell asks for.
-//   Rules              What is wrong with a cell and what it asks for, for the criteria of one run. step_rules() are
+//   Rules              The faults of a cell and its requests, for the criteria of one run. step_rules() are
 //                      the rules of the box; NearestFeatureSq(v, limit_sq, workspace) is how far v is from the nearest
 //                      feature that it is not on, squared, if that is less than the limit, and else the limit.
 //   Expected           The vertices that a batch expects to be inserted, for Rules. Made of their positions and
@@ -36,7 +36,7 @@ namespace wellspace::core {
 //                      wanted.
 //   kAsksForDistances  bool: whether a request depends on all vertices near its point, and not on the cell alone.
 //   RulesFor(structure, step_rules, expected)
-//                      The Rules of a run, with a null pointer; or for a record, with what its batch expects.
+//                      The Rules of a run, with a null pointer; or for a record, with the vertices its batch expects.
 //   LeastInRounds(least, vertices)
 //                      How many vertices of a bucket are worth rounds, if it is `least` of them elsewhere, while there
 //                      are so many vertices at all.
@@ -45,17 +45,14 @@ namespace wellspace::core {
 //   AreInOrder(requests)
 //                      Whether recorded requests, those of one vertex, would be the same now, as far as they depend on
 //                      more than the vertices near to it.
-//   MemoryBytes()      What it takes beside the structure.
+//   MemoryBytes()      The memory that it takes beside the structure.
 //
 // A domain is a value; where it has much to know, a handle of that. Its functions but MakeRoom and Added are const, and
 // may run at once; RulesFor, and the rules with expected vertices, beside Added, too.
 //
-// What a domain in space will want, and has its place here:
-// - A bound of its own for each node: AssessNodes takes one with every node; the loop sees edges alone.
-// - Several points for one decision: Steps may keep them, and return them from NextRequest one after the other, with
-//   the same Assessment before each. The loop does not promise that nothing shorter comes between them.
-// - The trial cell of a point that is no vertex: Cells computes those of vertices, and nothing here forbids a function
-//   more. CurrentCells in refine.h and SpeculatedCells in rounds.cc are the two that would have it.
+// SpaceDomain shows further needs of a domain: a bound of its own for each node, which AssessNodes takes with every
+// node; several points for one decision, which Steps return one after the other; and trial cells of points that are no
+// vertices, which its rules compute by the structure.
 template <typename T>
 concept RefinedDomain = requires(T domain, const T& same, const typename T::Place& place,
                                  std::span<const typename T::Request> requests,

@@ -1,4 +1,4 @@
-// What is remembered of a vertex' cell between two looks at it. PendingVertices keeps one for each vertex, and asks it
+// A memo of a vertex' cell between two looks at it. PendingVertices keeps one for each vertex, and asks it
 // whether a new neighbour matters.
 #ifndef WELLSPACE_CORE_REFINE_CELL_MEMO_H_
 #define WELLSPACE_CORE_REFINE_CELL_MEMO_H_
@@ -8,8 +8,8 @@
 
 namespace wellspace::core {
 
-// One of three: nothing; a radius; or an edge at the boundary. Four bytes, since there is one for every vertex. What is
-// remembered is rounded to the safe side: a radius up, an edge down.
+// One of three: nothing; a radius; or an edge at the boundary. Four bytes, since there is one for every vertex. A memo
+// is rounded to the safe side: a radius up, an edge down.
 class CellMemo {
  public:
   // Nothing: the vertex is pending, or its cell has changed since.

@@ -31,7 +31,7 @@ struct alignas(kCacheLines) StepWorkspace {
   std::vector<WatchedNode<D>> watched;
 };
 
-// A step is what is found of the cell of a vertex between two insertions for it: what is wrong, which neighbours have
+// A step has the findings about the cell of a vertex between two insertions for it: its faults, which neighbours have
 // to know, and what is to be inserted next. Figure 4 of [HT08] is a loop over steps (Refinement::RefineVertex), which
 // are computed here, or replayed where they have been recorded (RecordedSteps): both classes have the same functions.
 // They are called in the order Assess, NextRequest, Inserted; then Assess again. The others tell of the step that was
@@ -61,7 +61,7 @@ class CellSteps {
 
   Polytope<D>& cell() { return workspace_.own.cell; }
 
-  // What is wrong with the cell; null if it has too many nodes to tell.
+  // The faults of the cell; null if it has too many nodes to tell.
   const Assessment* Assess() {
     if (cell().IsTooLarge()) {
       return nullptr;
@@ -78,7 +78,7 @@ class CellSteps {
   }
   void AppendNotices(std::vector<NeighborNotice>& notices) { rules_.AppendNotices(cell(), faces_, found_, notices); }
 
-  // What is to be inserted; null if nothing, and this is the last step. Valid until the next call.
+  // The next insertion; null if none, and this is the last step. Valid until the next call.
   const InsertionRequest<D>* NextRequest() {
     request_ = rules_.NextRequest(v_, cell(), found_, edge_limit_sq_, [this](VertexId u, const Box<D>& clip) {
       return cells_.ComputeOther(u, clip, workspace_.other);
@@ -86,10 +86,10 @@ class CellSteps {
     return request_.has_value() ? &*request_ : nullptr;
   }
 
-  // Goes on to the next step: what was asked for has been inserted as `x`.
+  // Goes on to the next step: the request has been inserted as `x`.
   void Inserted(VertexId x) { cell().CutBeforePlace(x, request_->point.position); }
 
-  // Of the last step: the nodes on faces of the vertex that it has to watch. Valid until the next call.
+  // The nodes on faces of the vertex that it has to watch, of the last step. Valid until the next call.
   std::span<const WatchedNode<D>> NodesToWatch() {
     workspace_.watched.clear();
     AppendNodesToWatch(workspace_.watched);
@@ -99,7 +99,7 @@ class CellSteps {
     rules_.AppendNodesToWatch(v_, cell(), found_, watched);
   }
 
-  // Of the last step, if the cell is good: the simplices at the vertex, kept for as long as `stars` needs them.
+  // The simplices at the vertex, if the last step found its cell good, kept for as long as `stars` needs them.
   typename StarWriter<D>::Simplices FindStar(StarWriter<D>& stars) {
     if (!stars.NeedsStars()) {
       return {};
@@ -110,7 +110,7 @@ class CellSteps {
   }
   void FindStar(Star<D>& star) { cell().FindStar(star); }
 
-  // What has taken the place of what Assess found while the last request was looked for; null: nothing has.
+  // The assessment that has replaced that of Assess while the last request was looked for; null: none has.
   const Assessment* Reassessed() const { return nullptr; }
 
  private:

@@ -1,4 +1,4 @@
-// What refinement has to bring about: the bounds that every simplex has to meet.
+// The goal of the refinement: the bounds that every simplex has to meet.
 #ifndef WELLSPACE_CORE_REFINE_CRITERIA_H_
 #define WELLSPACE_CORE_REFINE_CRITERIA_H_
 

@@ -1,4 +1,4 @@
-// Insertions of the refinement: those that a cell asks for, as the rules return them and batches record them; and those
+// Insertions of the refinement: requests of a cell, as the rules return them and batches record them; and those
 // that have happened, as observers see them.
 #ifndef WELLSPACE_CORE_REFINE_INSERTION_H_
 #define WELLSPACE_CORE_REFINE_INSERTION_H_

@@ -1,4 +1,4 @@
-// What a vertex tells its neighbours once it has been added: made by the steps, taken by PendingVertices::Notify.
+// The news of a vertex for its neighbours once it has been added: made by the steps, taken by PendingVertices::Notify.
 #ifndef WELLSPACE_CORE_REFINE_NEIGHBOR_NOTICE_H_
 #define WELLSPACE_CORE_REFINE_NEIGHBOR_NOTICE_H_
 

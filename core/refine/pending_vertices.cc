@@ -137,7 +137,7 @@ void PendingVertices<D>::CellChanged(VertexId v, double nearest_sq) {
   const bool is_on_face = structure_.faces(v) != 0;
   SetMemo(v, is_on_face ? CellMemo::OfBoundaryEdge(nearest_sq) : CellMemo());
   if (is_on_face && criteria_->criterion == Criterion::kWellSpaced) {
-    schedule_.Add(v, nearest_sq);  // what is remembered for the faces leaves no room for the radius
+    schedule_.Add(v, nearest_sq);  // the memo for the faces leaves no room for the radius
   }
 }
 
@@ -152,7 +152,7 @@ void PendingVertices<D>::SetMemo(VertexId v, CellMemo memo, std::span<const Watc
   }
 }
 
-// Has ScheduleCollected schedule `u`, for the edge of that squared length, or for the one that is remembered.
+// Has ScheduleCollected schedule `u`, for the edge of that squared length, or for a shorter one of its memo.
 template <int D>
 void PendingVertices<D>::Collect(VertexId u, double edge_sq) {
   const CellMemo memo = memos_[Index(u)];
@@ -161,7 +161,7 @@ void PendingVertices<D>::Collect(VertexId u, double edge_sq) {
 
 template <int D>
 void PendingVertices<D>::ScheduleCollected() {
-  std::sort(collected_.begin(), collected_.end());  // what comes next is to depend on nothing but the cell
+  std::sort(collected_.begin(), collected_.end());  // later steps are to depend on nothing but the cell
   for (const auto& [u, edge_sq] : collected_) {
     SetMemo(u, {});
     schedule_.Add(u, edge_sq);

@@ -1,4 +1,4 @@
-// Which vertices have to be looked at, and when; and what is remembered of the cells of the others.
+// The schedule of the vertices that have to be looked at, and the memos of the cells of the others.
 #ifndef WELLSPACE_CORE_REFINE_PENDING_VERTICES_H_
 #define WELLSPACE_CORE_REFINE_PENDING_VERTICES_H_
 
@@ -41,7 +41,7 @@ using FeatureDistance = std::function<double(VertexId, double limit_sq, Workspac
 // - the repair of slivers moves and adds vertices, and keeps the criteria: CellChanged.
 //
 // Thread safety: thread-compatible; const functions may run at once.
-// Invariants: (1) every vertex is pending, or what is remembered of its cell is right, as long as Add is told of every
+// Invariants: (1) every vertex is pending, or the memo of its cell is right, as long as Add is told of every
 //             vertex that is added.
 template <int D>
 class PendingVertices {
@@ -61,7 +61,7 @@ class PendingVertices {
   // Makes room for so many vertices.
   void Reserve(uint32_t vertices);
 
-  // Forgets what is remembered of cells, and schedules all vertices for these criteria.
+  // Forgets the memos of cells, and schedules all vertices for these criteria.
   void Begin(const MeshCriteria<D>& criteria, std::span<const int16_t> first_buckets);
   // Forgets the criteria: all vertices have to be scheduled again.
   void End() { criteria_.reset(); }
@@ -72,10 +72,10 @@ class PendingVertices {
   Schedule& schedule() { return schedule_; }
   const Schedule& schedule() const { return schedule_; }
 
-  // Schedules the new vertex `x`, which is near `near` and whose nearest neighbour is as near as it says, and at once
-  // the vertices on a face of x that watch a node there which x cuts off: their edges may be shorter than any of x.
-  // Where the nodes of some watchers are not known, it calls notify_within(radius), which has to Notify the neighbours
-  // of x by the cell that is clipped so.
+  // Schedules the new vertex `x`, which is near `near` and whose nearest neighbour is as near as it says. At once it
+  // schedules the vertices on a face of x that watch a node there which x cuts off: their edges may be shorter than any
+  // of x. Where the nodes of some watchers are not known, it calls notify_within(radius), which has to Notify the
+  // neighbours of x by the cell that is clipped so.
   //
   // REQUIRES:   HasBegun().
   template <typename NotifyWithin>
@@ -88,7 +88,7 @@ class PendingVertices {
 
   // Schedules those neighbours of `v` that it may have spoiled by being added: of all, or, once some have been
   // notified, of the vertices that are not pending. A simplex that breaks rho has v for a corner; its shortest edge is
-  // one of v's, and then v sees to it, or has belonged to a cell that kept rho, and still does. What is left:
+  // one of v's, and then v sees to it, or has belonged to a cell that kept rho, and still does. Two cases are left:
   // - well-spaced: v may be the nearest neighbour now, so that other nodes are too far;
   // - a node on one of the neighbour's own faces was too far and asked for nothing: it may have become a circumcentre
   //   if this cell touches the face beside it.
@@ -101,11 +101,11 @@ class PendingVertices {
   // Whether a vertex may be pending for a shorter edge than those of `bucket`, which then comes first.
   bool HasShorterThan(int bucket) const { return schedule_.HasBelow(bucket); }
 
-  // Schedules `v`, which was taken from `bucket`, for what was found, to be looked at anew.
+  // Schedules `v`, which was taken from `bucket`, to be looked at anew for the faults in `found`.
   void Postpone(VertexId v, const Assessment& found, int bucket);
 
-  // Remembers of the cell of `v` what was found; the nodes that are too far for the edge of a face, if there is one,
-  // are `watched`, or are not known.
+  // Writes `found` into the memo of the cell of `v`; the nodes that are too far for the edge of a face, if there is one
+  // such, are `watched`, or are not known.
   void Remember(VertexId v, const Assessment& found, std::span<const WatchedNode<D>> watched);
 
   // Schedules `v`, which was taken from `bucket` and needs nothing there, but is not done: by the shortest edge that
@@ -118,7 +118,7 @@ class PendingVertices {
   // REQUIRES:   HasBegun(); every vertex whose neighbours have changed is told of.
   void CellChanged(VertexId v, double nearest_sq);
 
-  // Asks the memory for what is kept of `v`.
+  // Asks the memory for the entries of `v`.
   void Prefetch(VertexId v) const {
     schedule_.Prefetch(v);
     PrefetchLine(&memos_[Index(v)]);
@@ -131,11 +131,11 @@ class PendingVertices {
   }
 
  private:
-  // What counts for a new vertex at once is this times its empty radius away: no farther out than the region that
-  // bottom-up work has graded. Its cell is clipped so to notify its neighbours.
+  // The clip by which a new vertex notifies its neighbours at once, relative to its empty radius: no farther out than
+  // the region that bottom-up work has graded.
   static constexpr double kAround = 1.5;
 
-  // Which neighbours of a vertex have been told that it was added.
+  // The neighbours of a vertex that have been told that it was added.
   enum class Notified : uint8_t {
     kNone,        // it has just been added
     kWithinClip,  // the neighbours in its cell as it was clipped then

@@ -13,6 +13,7 @@
 #include "core/base/thread_team.h"
 #include "core/refine/checks.h"
 #include "core/refine/plane/plane_domain.h"
+#include "core/refine/space/space_domain.h"
 
 namespace wellspace::core {
 namespace {
@@ -68,9 +69,9 @@ template <typename Domain>
 absl::Status Refinement<Domain>::ScheduleAll(const MeshCriteria<D>& criteria, const VertexPredictor& predict,
                                              ThreadTeam& team) {
   rounds_.ReattachAll();
-  structure_.CommitAll();  // what was added before something was thrown
+  structure_.CommitAll();  // vertices added before an exception
   absl::Status predicted;
-  const absl::Cleanup end = [&team] { team.Drop(); };  // of what is begun, where something is thrown
+  const absl::Cleanup end = [&team] { team.Drop(); };  // of calls that are begun, where something is thrown
   team.BeginCall([&] { predicted = Predict(predict); });
   FeatureDistance<D> feature_sq;
   if constexpr (Domain::kHasFeatures) {
@@ -102,7 +103,7 @@ absl::Status Refinement<Domain>::Predict(const VertexPredictor& predict) {
   return absl::OkStatus();
 }
 
-// Makes room for so many vertices, and some more, so that arrays need not be moved as they grow; what is not used takes
+// Makes room for so many vertices, and some more, so that arrays need not be moved as they grow; unused room takes
 // no memory.
 template <typename Domain>
 void Refinement<Domain>::Reserve(uint32_t vertices) {
@@ -115,7 +116,7 @@ void Refinement<Domain>::Reserve(uint32_t vertices) {
 // Line 5: while vertices are pending, those of the lowest bucket are refined, in rounds where there are many.
 template <typename Domain>
 absl::Status Refinement<Domain>::Loop() {
-  WELLSPACE_RETURN_IF_ERROR(RefineInRounds());  // what a run that was stopped has detached
+  WELLSPACE_RETURN_IF_ERROR(RefineInRounds());  // the bucket that a stopped run has detached
   Schedule& schedule = pending_.schedule();
   for (int lowest = schedule.Lowest(); lowest >= 0; lowest = schedule.Lowest()) {
     if (rounds_.Begin(lowest)) {
@@ -135,7 +136,7 @@ absl::Status Refinement<Domain>::Loop() {
   return absl::OkStatus();
 }
 
-// Refines what is pending below `bucket`.
+// Refines the vertices that are pending below `bucket`.
 template <typename Domain>
 absl::Status Refinement<Domain>::RefineShorterThan(int bucket) {
   Schedule& schedule = pending_.schedule();
@@ -244,8 +245,8 @@ absl::Status Refinement<Domain>::RefineByCell(VertexId v, int bucket) {
   return RefineVertex(v, bucket, steps);
 }
 
-// [HT08] Figure 4 for one vertex, `v`, which was taken from `bucket`: inserts what its steps ask for, until nothing
-// that the bucket may ask for is wrong with its cell, or something shorter comes first.
+// [HT08] Figure 4 for one vertex, `v`, which was taken from `bucket`: makes the insertions that its steps ask for,
+// until its cell has no more faults that count in the bucket, or a shorter edge comes first.
 template <typename Domain>
 template <typename Steps>
 absl::Status Refinement<Domain>::RefineVertex(VertexId v, int bucket, Steps& steps) {
@@ -398,5 +399,6 @@ uint64_t Refinement<Domain>::MemoryBytes() const {
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE
 template class Refinement<PlaneDomain>;
+template class Refinement<SpaceDomain>;
 
 }  // namespace wellspace::core

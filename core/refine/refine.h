@@ -38,12 +38,12 @@ using RefinementObserver = std::function<void(const QueryStructure<D>&, const In
 using VertexPredictor = std::function<absl::StatusOr<uint64_t>()>;
 
 // The refinement of one structure in a domain, which may be run again: after an error, after vertices were added, for
-// other criteria. Domains are BoxDomain<D> and PlaneDomain; box_domain.h says what one has. Built with WELLSPACE_CHECKS
-// it asserts at each insertion what docs/design/guarantees.md promises of it, as far as that can be seen nearby, and
+// other criteria. Domains are BoxDomain<D>, PlaneDomain and SpaceDomain; see box_domain.h. Built with WELLSPACE_CHECKS
+// it asserts at each insertion the promises of docs/design/guarantees.md, as far as they can be seen nearby, and
 // aborts with the figures.
 //
-// The parts: what has to be looked at (PendingVertices), what is wrong with a cell and what it asks for (the domain's
-// Steps, by its Rules), the loop (here), and what threads do ahead of it (Rounds).
+// The parts: vertices to be looked at (PendingVertices), the faults of a cell and its requests (the domain's
+// Steps, by its Rules), the loop (here), and the work of threads ahead of it (Rounds).
 //
 // Thread safety: thread-compatible.
 // Invariants: (1) every vertex is pending, or its cell meets the criteria of the last run, for as long as no vertex is
@@ -55,24 +55,24 @@ class Refinement {
  public:
   static constexpr int D = Domain::kDimension;
 
-  // No vertex is added nearer than `min_edge` to another. What is meshed of `domain` takes the place of the box.
+  // No vertex is added nearer than `min_edge` to another. The meshed part of `domain` takes the place of the box.
   //
-  // REQUIRES:   the structure, and what the domain is a handle of, outlive this; the domain's vertices are those of the
-  //             structure.
+  // REQUIRES:   the structure, and the object behind the handle `domain`, outlive this; they have the same
+  //             vertices.
   explicit Refinement(QueryStructure<D>& structure, double min_edge, Domain domain = Domain());
   Refinement(const Refinement&) = delete;
   Refinement& operator=(const Refinement&) = delete;
 
   // Adds vertices until (1) no Delaunay simplex of the box breaks the criteria, and (2) no Voronoi cell touches a face
-  // of the box that its vertex does not lie on, so that the Delaunay triangulation decomposes exactly the box. Ties are
+  // of the box that its vertex does not lie on. By (2) the Delaunay triangulation decomposes exactly the box. Ties are
   // perturbed, as they are for the simplices.
   //
   // REQUIRES:   rho at least MinimumRho(D).
   // Guarantees: (1) bottom-up, [HT08] Definition 1: the vertex whose cell is looked at has an edge shorter, up to the
   //             ratio of a bucket, than all that are pending; (2) deterministic: the vertices and the lists of
   //             simplices are the same to the bit for any number of threads, and however often the run was stopped.
-  // Complexity: O(m) queries for m vertices in the end; when run again for the same criteria, in proportion to what was
-  //             added since and to what that makes necessary.
+  // Complexity: O(m) queries for m vertices in the end; when run again for the same criteria, in proportion to the
+  //             vertices added since and to the insertions that these make necessary.
   // Errors:     RESOURCE_EXHAUSTED with the bound that was met, one of the context's memory too; CANCELLED,
   //             DEADLINE_EXCEEDED; those of `predict`. All stays usable: a later run takes up the work where it was
   //             left.
@@ -87,13 +87,16 @@ class Refinement {
   void VertexAdded(VertexId x);
 
   // Tells that the cell of `v`, which may be new, has changed, but meets the criteria of the last run; if v is on a
-  // face of the box, `nearest_sq` is at most the squared distance to its nearest neighbour. What is remembered of the
+  // face of the box, `nearest_sq` is at most the squared distance to its nearest neighbour. The memo of the
   // cell is forgotten: an insertion nearby has v looked at again in any case that could matter. Simplices are no longer
   // listed.
   //
   // REQUIRES:   the last run came to its end; every vertex whose neighbours have changed is told of.
   // Complexity: O(1), except for the first after a run for other criteria.
   void CellChanged(VertexId v, double nearest_sq);
+
+  // Has the next run look at all vertices again: the demands of its domain have changed.
+  void ForgetRun() { pending_.End(); }
 
   // The simplices at all vertices, when the last run came to its end, unless a cell has changed otherwise since the
   // first run for these criteria.
@@ -102,13 +105,13 @@ class Refinement {
   // Forgets the simplices; none are listed until all vertices are scheduled again.
   void DropStars() { stars_.GiveUp(); }
 
-  // What threads have speculated on in all runs.
+  // The speculation of threads in all runs.
   const SpeculationCounts& speculation() const { return rounds_.counts(); }
 
-  // What all queries have cost.
+  // The cost of all queries.
   QueryCounters counters() const;
 
-  // What the refinement takes in memory beside the structure.
+  // The memory of the refinement beside the structure.
   uint64_t MemoryBytes() const;
 
  private:
@@ -155,7 +158,7 @@ class Refinement {
   Rounds<Domain> rounds_;
   StepWorkspace<D> workspace_;
 
-  // Of the last run.
+  // State of the last run.
   std::optional<StepRules<D>> step_rules_;
   std::optional<typename Domain::Rules> rules_;  // which refer to these
   uint64_t max_vertices_ = 0;

@@ -63,7 +63,7 @@ void RefinementChecks<D>::CheckInsertion(const StepRules<D>& rules, const Insert
   if (!encroaches && !(edge <= limit * (1 + kLengthRounding))) {
     Require(false, which(), "the edge is for a later bucket");
   }
-  // A projection takes at most half of the squared radius; where the box is thin, what it takes is also less than that.
+  // A projection takes at most half of the squared radius; where the box is thin, the loss is also less than that.
   const double kept = std::ldexp(1.0, 1 - D) * candidate.empty_radius_sq;
   const double thin = std::ldexp(box.ShortestSide() * box.ShortestSide(), 2 - D);
   if (!(point.empty_radius_sq >= std::min(kept, thin) * (1 - kLengthRounding))) {

@@ -1,4 +1,5 @@
-// What the checking build asserts of the refinement at each step. Refinement calls it where kChecks is set (checks.h).
+// The assertions of the checking build on the refinement at each step. Refinement calls it where kChecks is set
+// (checks.h).
 #ifndef WELLSPACE_CORE_REFINE_REFINEMENT_CHECKS_H_
 #define WELLSPACE_CORE_REFINE_REFINEMENT_CHECKS_H_
 
@@ -23,7 +24,7 @@ class RefinementChecks {
   // REQUIRES:   `structure` outlives this.
   explicit RefinementChecks(const QueryStructure<D>& structure) : structure_(structure) {}
 
-  // That no vertex is pending below `bucket`, from which `v` was taken, whose cell is `cell`: the neighbours in the
+  // Checks that no vertex is pending below `bucket`, from which `v` was taken, whose cell is `cell`: neighbours in the
   // cell each time, all vertices now and then.
   //
   // Complexity: O(nodes), amortised.
@@ -31,8 +32,8 @@ class RefinementChecks {
 
   // [HT08] Definition 1 at an insertion, before it is made: (1), that the edge is the bucket's, the place, and the
   // empty ball. `candidate` is the point before it was snapped to the boundary. A vertex on a feature may be farther
-  // from the one that asks than the others: the first split of a segment between small angles is in its middle third,
-  // however near to its end that one is.
+  // from the vertex that asks than others: the first split of a segment between small angles is in its middle third,
+  // however near to its end that vertex is.
   //
   // Complexity: that of a query.
   void CheckInsertion(const StepRules<D>& rules, const Insertion& insertion, const SteinerPoint<D>& candidate,

@@ -1,4 +1,5 @@
-// What rounding may do to what the refinement compares: nodes that are watched, and what the checking build asserts.
+// The effect of rounding on the comparisons of the refinement: on nodes that are watched, and on the assertions of the
+// checking build.
 #ifndef WELLSPACE_CORE_REFINE_ROUNDING_H_
 #define WELLSPACE_CORE_REFINE_ROUNDING_H_
 
@@ -12,7 +13,7 @@ namespace wellspace::core {
 // To lengths, relatively; to coordinates, relative to the largest.
 inline constexpr double kLengthRounding = 1e-9;
 inline constexpr double kCoordinateRounding = 0x1p-49;
-// What is looked for within a reach is looked for so much farther, so that rounding leaves out nothing within it.
+// A search within a reach goes so much farther, so that rounding leaves out nothing within it.
 inline constexpr double kBeyond = 1 + kLengthRounding;
 
 // To a coordinate.

@@ -31,8 +31,8 @@ namespace wellspace::core {
 //             first.
 class Schedule {
  public:
-  // Vertices in a block, if there are not so many that blocks could not be numbered: what a scan reads of a block fits
-  // into a cache of the second level.
+  // Vertices in a block, if there are not so many that blocks could not be numbered: the data of a block that a scan
+  // reads fit into a cache of the second level.
   static constexpr uint32_t kBlockSize = 512;
 
   // Lengths below `shortest` fall into the lowest bucket.
@@ -96,7 +96,7 @@ class Schedule {
   // How many vertices are pending.
   size_t size() const { return size_; }
 
-  // What the schedule takes in memory, without entries of vertices that have moved on.
+  // The memory of the schedule, without entries of vertices that have moved on.
   uint64_t MemoryBytes() const { return places_.size() * sizeof(Place) + size_ * sizeof(VertexId); }
 
   // The lowest bucket in which a vertex may be pending, -1 if there is none below `end`.
@@ -134,7 +134,7 @@ class Schedule {
   }
 
   // Detaches the vertices of `bucket`, the lowest: they stay pending in it, but without a place in its order, until
-  // they are taken or reattached. Returns them: the one that would be taken last comes first.
+  // they are taken or reattached. Returns them: the vertex that would be taken last comes first.
   HugeVector<VertexId> Detach(int bucket) {
     HugeVector<VertexId> detached = std::exchange(buckets_[bucket], {});
     // From the last on each once: a vertex that has been seen is not pending meanwhile.
@@ -177,7 +177,7 @@ class Schedule {
   }
 
  private:
-  // Of a double.
+  // The format of a double.
   static constexpr int kMantissaBits = 52;
   static constexpr int kExponentBias = 1023;
 

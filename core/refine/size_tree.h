@@ -42,7 +42,7 @@ class SizeTree {
   // Places in the order of the leaves.
   const std::vector<Place>& places() const { return places_; }
 
-  // What a tree of `count` places takes at most.
+  // The most memory of a tree of `count` places.
   static uint64_t BytesFor(uint64_t count) { return count * (sizeof(Place) + sizeof(Node)); }
 
   // The least of `most` and value(size, squared distance from `at`, a point or a box, to the place) over all places.
@@ -106,13 +106,13 @@ double SizeTree<D, Shape>::Least(const At& at, double most, const Value& value, 
     double bound;
     uint32_t node;
   };
-  std::array<Later, kMostLevels> later;  // what is to be looked at, if it still may have less
+  std::array<Later, kMostLevels> later;  // entries to be looked at, if they still may have less
   size_t count = 0;
   uint32_t i = 0;
   while (true) {
     const Node& node = nodes_[i];
     if (node.second != 0) {
-      // The one that may have less first. Few branches, which could not be predicted.
+      // The child that may have less first. Few branches, which could not be predicted.
       const double first_bound = bound(i + 1);
       const double second_bound = bound(node.second);
       const bool second_is_near = second_bound < first_bound;

@@ -34,7 +34,7 @@ struct SizeHint {
 // So h is G-Lipschitz, and 1-Lipschitz like the local feature size.
 //
 // Thread safety: immutable but for RaiseTo.
-// Guarantees: (1) h(x) depends, to the bit, neither on the order of boxes and samples nor on what was asked for before.
+// Guarantees: (1) h(x) depends, to the bit, neither on the order of boxes and samples nor on earlier queries.
 template <int D>
 class SizeField {
  public:
@@ -71,7 +71,7 @@ class SizeField {
   const std::vector<Region>& regions() const { return PlacesOf(regions_.get()); }
   const std::vector<SizedPlace<Point<D>>>& samples() const { return PlacesOf(samples_.get()); }
   const Growth& growth() const { return growth_; }
-  // What RaiseTo has been called with; else 0.
+  // The argument of RaiseTo; 0 before.
   double least() const { return least_; }
   // The same field without its boxes.
   SizeField OfSamples() const {

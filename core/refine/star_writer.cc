@@ -5,7 +5,7 @@
 namespace wellspace::core {
 namespace {
 
-// What writing a star reads is asked for so many before its turn.
+// The memory that writing a star reads is asked for so many before its turn.
 constexpr size_t kWrittenAhead = 4;
 
 }  // namespace
@@ -53,7 +53,7 @@ void StarWriter<D>::WriteAll(Collected& collected) {
   collected.stars.clear();
 }
 
-// Asks the memory for what writing a star reads.
+// Asks the memory for the lists that writing a star reads.
 template <int D>
 void StarWriter<D>::PrefetchWrite(Simplices star) const {
   for (const std::array<VertexId, D>& simplex : star) {

@@ -18,7 +18,7 @@
 
 namespace wellspace::core {
 
-// Stars are written in the order in which Write was called: by the caller, or, what is written while this collects, by
+// Stars are written in the order in which Write was called: by the caller, or, if they were collected, by
 // another thread after that.
 //
 // Thread safety: thread-compatible.
@@ -41,7 +41,7 @@ class StarWriter {
   // written.
   void Write(VertexId v, Simplices star, uint32_t vertex_count);
 
-  // Writes the star that Write has put off while what is read for it was asked for.
+  // Writes the star that Write has put off while the memory was asked for its lists.
   //
   // REQUIRES:   not IsWriting().
   void WriteLast();
@@ -54,13 +54,13 @@ class StarWriter {
   // Goes on collecting, or not.
   void SetCollecting(bool is_collecting) { is_collecting_ = is_collecting; }
 
-  // Collects no more, and has another thread write what has been collected.
+  // Collects no more, and has another thread write the collected stars.
   //
   // REQUIRES:   not IsWriting().
   void BeginWriting(ThreadTeam& team);
   // Whether another thread may write.
   bool IsWriting() const { return is_writing_; }
-  // Notes that what the team began has ended.
+  // Notes that the call which the team began has ended.
   void EndWriting() { is_writing_ = false; }
 
   // As StarLists.
@@ -71,7 +71,7 @@ class StarWriter {
     lists_.Clear();
   }
 
-  // Asks the memory for what is kept of `v`.
+  // Asks the memory for the list of `v`.
   void Prefetch(VertexId v) const {
     if (!is_collecting_) {
       lists_.Prefetch(v, 0);
@@ -100,7 +100,7 @@ class StarWriter {
   void PrefetchWrite(Simplices star) const;
 
   StarLists<D> lists_;
-  Star<D> star_;  // what Room returns
+  Star<D> star_;  // the result of Room
   Entry last_;    // with last_star_; no vertex if there is none
   Star<D> last_star_;
   bool is_collecting_ = false;

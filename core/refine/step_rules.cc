@@ -41,14 +41,14 @@ std::pair<int, int> NodeBetween(const Polytope<2>& cell, VertexId u, VertexId w)
 
 // For the bad node of the cell of `v` in the plane, at most sqrt(top_sq) away: the point that PetalPoint finds in that
 // cell, or in that of the other end of the edge where the way away from all vertices is there. `cell_of` computes the
-// other cell, clipped by what holds the petal and by `clip` around its site.
+// other cell, clipped by a box that holds the petal and by `clip` around its site.
 template <typename CellOf>
 SteinerPoint<2> PointInPetal(VertexId v, const Polytope<2>& cell, const Assessment& found, double top_sq, double rho,
                              double clip, CellOf cell_of) {
   const Plane<2>& edge = cell.plane(found.bad_plane);
   const std::array<uint16_t, 2>& planes = cell.nodes()[found.bad_node].planes;
   const Plane<2>& third = cell.plane(planes[planes[0] == found.bad_plane ? 1 : 0]);
-  // If the angle at v is obtuse, what is farther than the node is on the boundary of the other cell.
+  // If the angle at v is obtuse, points farther than the node are on the boundary of the other cell.
   if (third.kind == PlaneKind::kBisector && Dot<2>(edge.normal, third.normal) < 0) {
     const auto [centre, radius] = PetalOf(cell, found.bad_node, found.bad_plane, top_sq);
     Box<2> bounds = CubeAround<2>(edge.source.generator, clip);

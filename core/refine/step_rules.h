@@ -1,4 +1,4 @@
-// How a step follows from a cell: what is wrong with it, where a new vertex goes, and what its neighbours are to know.
+// How a step follows from a cell: its fault, where a new vertex goes, and the notices to its neighbours.
 // CellSteps asks in each step of a vertex in the box; PlaneRules takes clip and candidates from here.
 #ifndef WELLSPACE_CORE_REFINE_STEP_RULES_H_
 #define WELLSPACE_CORE_REFINE_STEP_RULES_H_
@@ -21,7 +21,7 @@
 
 namespace wellspace::core {
 
-// For the criteria of one run. What the functions return depends on the cell and on the places of vertices alone.
+// For the criteria of one run. Their results depend on the cell and on the places of vertices alone.
 //
 // Thread safety: thread-compatible; const functions may run at once, and beside QueryStructure::AddUncommitted.
 template <int D>
@@ -38,7 +38,7 @@ class StepRules {
   const MeshCriteria<D>& criteria() const { return criteria_; }
   FaceMask FacesOf(VertexId v) const { return structure_.faces(v); }
 
-  // A cell is clipped at so many times the longest edge of its bucket.
+  // A cell is clipped at this many times the longest edge of its bucket.
   double clip_factor() const { return clip_factor_; }
 
   // Half the side of the cube that clips the cells of a bucket which ends at edge_limit_sq.
@@ -48,13 +48,13 @@ class StepRules {
     return CubeAround<D>(structure_.point(v), ClipRadius(edge_limit_sq));
   }
 
-  // What is wrong with a cell, whose nodes are placed unless it is plainly good.
+  // The fault of a cell, whose nodes are placed unless it is plainly good.
   //
   // Complexity: O(nodes).
   // Source:     [HT08] Figure 4, lines 8 and 11.
   Assessment AssessCell(Polytope<D>& cell, FaceMask site_faces, double edge_limit_sq) const;
 
-  // The insertion that `cell`, that of `v`, asks for by edges up to a bucket's limit, by what was found; none if there
+  // The insertion that `cell`, that of `v`, asks for by edges up to a bucket's limit, by its assessment; none if there
   // is none. Calls cell_of at most once.
   //
   // Complexity: O(nodes), and the cell.

@@ -16,7 +16,7 @@ namespace wellspace::core {
 
 // Facets of the boundary that a solver treats alike.
 struct BoundaryPart {
-  int32_t tag = 0;  // above 0; what the facets are told by
+  int32_t tag = 0;  // above 0; by which solvers tell the facets
   std::string name;
   uint64_t facets = 0;
 
@@ -42,7 +42,7 @@ constexpr int32_t FaceTag(int face) { return face + 1; }
 // REQUIRES:   0 <= face < 2 kMaxDimension; see FaceIndex.
 std::string FaceName(int face);
 
-// What a mesh without features consists of: one region.
+// The regions of a mesh without features: one.
 Region WholeBox();
 
 // The facets on the faces of a box.

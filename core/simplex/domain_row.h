@@ -1,4 +1,4 @@
-// What the two ways of finding the triangles of a domain have in common: listed stars, and cells.
+// The common part of the two ways of finding the triangles of a domain: listed stars, and cells.
 #ifndef WELLSPACE_CORE_SIMPLEX_DOMAIN_ROW_H_
 #define WELLSPACE_CORE_SIMPLEX_DOMAIN_ROW_H_
 
@@ -24,7 +24,7 @@ struct DomainRow {
   auto operator<=>(const DomainRow&) const = default;
 };
 
-// Of each vertex on a segment, its place in the chain; 0 of others.
+// The place of each vertex on a segment in its chain; 0 of other vertices.
 //
 // Complexity: O(vertices).
 std::vector<uint32_t> PlacesIn(const PlanarDomain::Chains& chains, uint32_t segments, uint32_t vertices);

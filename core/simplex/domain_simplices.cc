@@ -18,7 +18,7 @@
 namespace wellspace::core {
 namespace {
 
-// Neighbours of a vertex along segments, and what is between.
+// The way from a vertex to its neighbour along a segment, and the face beside it.
 struct Way {
   VertexId next = kNoVertex;  // the neighbour
   uint32_t face = 0;          // counterclockwise from there
@@ -94,7 +94,7 @@ class DomainStars {
       first = at;
     }
     if (!broken_.empty() && std::find(edges_.begin(), edges_.end(), kNoVertex) != edges_.end()) {
-      return false;  // what is missing may be beyond the clip
+      return false;  // the missing part may be beyond the clip
     }
     uint32_t face = ways_.empty() ? domain_.FaceOf(v) : 0;
     bool is_whole = true;
@@ -130,7 +130,7 @@ class DomainStars {
   std::vector<uint32_t> broken_;
 };
 
-// What one block of vertices has.
+// The triangles of one block of vertices.
 struct Block {
   HugeVector<uint32_t> indices;
   std::vector<uint32_t> faces;
@@ -165,7 +165,7 @@ bool AppendStar(const QueryStructure<2>& structure, VertexId v, std::span<const 
   return has_end;
 }
 
-// Joins what the blocks have, unless a subsegment is broken.
+// Joins the triangles of the blocks, unless a subsegment is broken.
 DomainSimplices Join(std::span<const Block> blocks) {
   DomainSimplices all;
   size_t count = 0;
@@ -189,7 +189,7 @@ DomainSimplices Join(std::span<const Block> blocks) {
 
 }  // namespace
 
-// Of each vertex on a segment, its place in the chain; 0 of others.
+// The place of each vertex on a segment in its chain; 0 of other vertices.
 std::vector<uint32_t> PlacesIn(const PlanarDomain::Chains& chains, uint32_t segments, uint32_t vertices) {
   std::vector<uint32_t> place(vertices);
   for (uint32_t segment = 0; segment < segments; ++segment) {
@@ -215,7 +215,7 @@ absl::StatusOr<DomainSimplices> ComputeDomainSimplices(const QueryStructure<2>& 
       return *std::move(listed);
     }
   }
-  // What the blocks hold, and all of them joined: two triangles a vertex, twice.
+  // The triangles of the blocks, and all of them joined: two triangles a vertex, twice.
   WELLSPACE_RETURN_IF_ERROR(
       context.AllowMemory(structure.MemoryBytes() + domain.MemoryBytes() + output_index.size_bytes() +
                           uint64_t{structure.vertex_count()} * (16 * sizeof(uint32_t) + sizeof(uint32_t))));

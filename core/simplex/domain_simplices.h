@@ -1,5 +1,5 @@
-// The triangles of a refined domain in the plane, each with its face: what ComputeSimplices is in a box. PlaneMesher
-// calls it at the end of Refine.
+// The triangles of a refined domain in the plane, each with its face, as ComputeSimplices finds them in a box.
+// PlaneMesher calls it at the end of Refine.
 #ifndef WELLSPACE_CORE_SIMPLEX_DOMAIN_SIMPLICES_H_
 #define WELLSPACE_CORE_SIMPLEX_DOMAIN_SIMPLICES_H_
 

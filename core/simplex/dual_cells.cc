@@ -53,7 +53,7 @@ double Foot(const Point<D>& p, const Point<D>& q, const Point<D>& r) {
   return 0.5 * std::sqrt(DistanceSq<D>(p, q)) * Dot<D>(a, b) / DoubleArea<D>(a, b);
 }
 
-// Of the facet that is dual to each edge, the part in the simplex; parts beyond a face are negative.
+// The part in the simplex of the facet that is dual to each edge; parts beyond a face are negative.
 std::array<double, kEdges<2>> PartsOf(const Simplex<2>& corners) {
   std::array<double, kEdges<2>> parts;
   parts[EdgeOf(0, 1)] = Foot<2>(corners[0], corners[1], corners[2]);

@@ -31,7 +31,7 @@ struct DualCells {
   HugeVector<double> facet_areas;
 };
 
-// What dual cells are made of: the arrays of a core::Mesh, of a client::Mesh, or of any other.
+// The input of dual cells: the arrays of a core::Mesh, of a client::Mesh, or of any other.
 struct DelaunayMesh {
   int dimension = 0;
   std::span<const double> points;       // n x dimension

@@ -59,7 +59,7 @@ class Subsegments {
   }
 
  private:
-  // The same from a vertex between the ends of a segment.
+  // The half-edge from `u`, which is between the ends of a segment, to `w`.
   HalfEdge FromInner(VertexId u, VertexId w) const {
     const uint32_t segment = domain_.PlaceOf(u).segment;
     const VertexId* const at = chains_.Of(segment).data() + place_[Index(u)];
@@ -89,7 +89,7 @@ class BoundarySum {
   uint64_t sum_ = 0;
 };
 
-// What tells whether triangles are those of the domain: the edges that are theirs on one side alone, and how many of
+// The evidence that triangles are those of the domain: the edges that are theirs on one side alone, and how many of
 // their edges are subsegments.
 struct Outline {
   BoundarySum boundary;
@@ -147,7 +147,7 @@ class ListedDomainStars {
     }
   }
 
-  // That of all triangles.
+  // The outline of all triangles.
   const Outline& outline() const { return outline_; }
   const QueryCounters& counters() const { return stars_.counters(); }
 
@@ -245,8 +245,8 @@ struct ZOrder {
   std::vector<uint32_t> first;  // by block, and one more
 };
 
-// Triangles by the vertex of each that has the lowest output index: those of the vertex of rank r are the numbers
-// first[r] to first[r + 1]. Each has three words, in the place of which its indices can be put.
+// Triangles by the vertex of each that has the lowest output index: the triangles of the vertex of rank r are the
+// numbers first[r] to first[r + 1]. Each has three words, in the place of which its indices can be put.
 struct RowsByRank {
   // Takes the rows of the threads, in any order.
   RowsByRank(std::deque<ListedOfThread>& of_threads, uint32_t vertices) : first(size_t{vertices} + 2) {
@@ -285,7 +285,7 @@ struct RowsByRank {
 void FindListed(const ZOrder& order, std::span<const uint32_t> output_index, ThreadTeam& team,
                 std::deque<ListedOfThread>& of_threads, const RunContext& context) {
   for (ListedOfThread& own : of_threads) {
-    own.rows.reserve(2 * order.vertex.size());  // what is not used takes no memory
+    own.rows.reserve(2 * order.vertex.size());  // unused room takes no memory
   }
   team.ForEach(order.first.size() - 1, [&](size_t block) {
     ListedOfThread& own = of_threads[ThreadTeam::CurrentThread()];
@@ -356,7 +356,7 @@ absl::StatusOr<std::optional<DomainSimplices>> ListedDomainSimplices(
   if (!(outline == OutlineOf(domain, chains))) {
     return std::nullopt;
   }
-  drop_stars();  // and what else is not read again
+  drop_stars();  // and other data that are not read again
   stale = {};
   place = {};
   RowsByRank by_rank(of_threads, structure.vertex_count());

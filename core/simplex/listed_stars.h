@@ -18,7 +18,7 @@
 
 namespace wellspace::core {
 
-// The simplices at one vertex after the other, of those that are listed there the ones that are in the mesh: the vertex
+// The simplices at one vertex after the other that are listed there and are in the mesh: the vertex
 // is the last of them to have been looked at, and no vertex that came later spoils them.
 //
 // Thread safety: thread-compatible.
@@ -31,7 +31,7 @@ class ListedStars {
   ListedStars(const QueryStructure<D>& structure, const StarLists<D>& stars, const StaleStars& stale)
       : structure_(structure), stars_(stars), stale_(stale) {}
 
-  // Those of `v`, in the order in which they are listed. Valid until the next call; the caller may change them.
+  // The simplices of `v`, in the order in which they are listed. Valid until the next call; the caller may change them.
   //
   // Complexity: O(listed); with vertices that came later, as many exact signs each.
   // Errors:     none.
@@ -57,7 +57,7 @@ class ListedStars {
     return rows_;
   }
 
-  // What its scratch takes in memory.
+  // The memory of its scratch.
   uint64_t MemoryBytes() const { return rows_.capacity() * sizeof(Row); }
   // Queries are stars.
   const QueryCounters& counters() const { return counters_; }

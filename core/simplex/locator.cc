@@ -17,7 +17,7 @@ constexpr size_t kSimplicesBetweenChecks = size_t{1} << 16;
 // A walk over more facets costs more than a search from the top of the tree.
 constexpr int kMostSteps = 30;
 
-// Of each simplex, the simplex over the facet opposite to each of its corners.
+// The neighbours of each simplex: over the facet opposite to each of its corners.
 template <int D>
 HugeVector<uint32_t> FindNeighbours(std::span<const uint32_t> simplices, size_t vertices) {
   // Facets are gathered by their lowest vertex.
@@ -147,7 +147,7 @@ double Differences(const Simplex<D>& corners, const Point<D>& x, double scale, S
 // Products of differences that are so far from 1 may be beyond the range of doubles.
 constexpr double kFarFromOne = 0x1p100;
 
-// What a determinant of rows of differences, none of them larger than `size`, may be wrong by, if that is known. Of
+// The error of a determinant of rows of differences, none of them larger than `size`, if it is known. Of
 // Shewchuk, 1997: 4 eps in the plane and 8 eps in space, of the sum of the sizes of all products.
 template <int D>
 double ErrorBound(double size) {
@@ -262,7 +262,7 @@ typename Locator<D>::Side Locator<D>::Test(uint32_t simplex, const Point<D>& x, 
       const Point<D> corner = std::exchange(corners[i], x);
       const Sign sign = Orientation<D>(corners).sign;
       corners[i] = corner;
-      // What is positive may have underflown, or be lost in rounding.
+      // A positive value may have underflown, or be lost in rounding.
       volume = sign == Sign::kZero       ? 0
                : sign == Sign::kNegative ? -1
                                          : std::max(std::abs(volume), std::numeric_limits<double>::min());

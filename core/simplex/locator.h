@@ -55,7 +55,7 @@ class Locator {
   // Complexity: O(1) near the hint; else O(log n) for most meshes.
   PlaceInSimplex<D> Locate(const Point<D>& x, uint32_t hint = kNoSimplex) const;
 
-  // What a locator of so many simplices takes in memory. Unit: bytes.
+  // The memory that a locator of this number of simplices takes. Unit: bytes.
   static uint64_t BytesFor(uint64_t simplices);
 
  private:

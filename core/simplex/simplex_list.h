@@ -1,5 +1,5 @@
-// Simplices one after the other, in the form of the output, with the worst of their shapes: what each block of vertices
-// is made into.
+// Simplices one after the other, in the form of the output, with the worst of their shapes: the result of each block of
+// vertices.
 #ifndef WELLSPACE_CORE_SIMPLEX_SIMPLEX_LIST_H_
 #define WELLSPACE_CORE_SIMPLEX_SIMPLEX_LIST_H_
 
@@ -14,7 +14,7 @@ namespace wellspace::core {
 
 // Thread safety: thread-compatible. Reused from block to block.
 // Invariants: (1) max_radius_edge and min_angle_deg are the largest RadiusEdgeRatio and the smallest Angles of the
-// simplices, to the bit, whatever their order; those before Clear() count, too.
+// simplices, to the bit, whatever their order; simplices before Clear() count, too.
 template <int D>
 class SimplexList {
  public:
@@ -35,7 +35,7 @@ class SimplexList {
   void Clear() { indices_.clear(); }
 
  private:
-  // What doubles tell of a simplex.
+  // The facts about a simplex that doubles tell.
   struct Glance {
     Sign orientation = Sign::kZero;  // kZero where they do not tell
     bool is_clearly_better = false;

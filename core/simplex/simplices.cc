@@ -36,16 +36,17 @@ constexpr size_t kMostGrowth = 128;
 // Thread safety: thread-safe.
 class BlockJoin {
  public:
-  // `held_bytes`: what is held besides.
+  // `held_bytes`: the memory held besides.
   BlockJoin(size_t block_count, uint64_t held_bytes, RunContext& context)
       : block_count_(block_count), held_bytes_(held_bytes), context_(context) {}
 
-  // The next block to be made: the one that the others wait for first.
+  // The next block to be made: the block that the others wait for first.
   size_t NextBlock() { return next_block_++; }
   // Whether the blocks that are to come are of no use.
   bool HasEnded() const { return context_.IsCancelled() || is_refused_; }
 
-  // Takes the indices of the simplices of a block. `more_bytes`: what its thread holds more than at its last block.
+  // Takes the indices of the simplices of a block. `more_bytes`: the growth of its thread's memory since its last
+  // block.
   void Take(size_t block, const HugeVector<uint32_t>& indices, uint64_t more_bytes) {
     std::lock_guard lock(mutex_);
     if (is_refused_) {
@@ -80,7 +81,7 @@ class BlockJoin {
     ++joined_count_;
     const size_t size = joined_.size() + indices.size();
     if (size > joined_.capacity()) {
-      // As many as there will be if the blocks to come are like these, and a quarter more: what is not used takes no
+      // As many as there will be if the blocks to come are like these, and a quarter more: unused room takes no
       // memory.
       Allow(joined_.size());
       if (is_refused_) {
@@ -93,7 +94,7 @@ class BlockJoin {
     Allow(0);
   }
 
-  // Asks for what is held, and `more` indices.
+  // Asks for the memory that is held, and for `more` indices.
   void Allow(size_t more) {
     const uint64_t bytes = held_bytes_ + (joined_.size() + unjoined_size_ + more) * sizeof(uint32_t);
     if (absl::Status status = context_.AllowMemory(bytes); !status.ok()) {
@@ -116,7 +117,7 @@ class BlockJoin {
 };
 
 // The simplices of `block_count` blocks, which threads share out: append(block, scratch, out) appends those of one,
-// with a Scratch of its thread, which takes scratch_bytes(scratch) besides what is in `held_bytes`.
+// with a Scratch of its thread, which takes scratch_bytes(scratch) beside `held_bytes`.
 template <int D, typename Scratch, typename Append, typename Bytes, typename Counters>
 absl::StatusOr<Simplices> JoinBlocks(size_t block_count, uint64_t held_bytes, int threads, RunContext& context,
                                      Append append, Bytes scratch_bytes, Counters counters_of) {
@@ -203,7 +204,8 @@ void AppendCell(const QueryStructure<D>& structure, VertexId v, std::span<const 
 }
 
 // The simplices of the cells of all vertices in `block_count` blocks whose other vertices are wanted:
-// for_each_vertex_of(block, f) calls f(VertexId). `more_bytes`: what is held besides the structure and `output_index`.
+// for_each_vertex_of(block, f) calls f(VertexId). `more_bytes`: the memory held besides the structure and
+// `output_index`.
 template <int D, typename ForEachVertexOf, typename IsWanted>
 absl::StatusOr<Simplices> JoinCells(const QueryStructure<D>& structure, std::span<const uint32_t> output_index,
                                     size_t block_count, uint64_t more_bytes, int threads, RunContext& context,
@@ -214,7 +216,7 @@ absl::StatusOr<Simplices> JoinCells(const QueryStructure<D>& structure, std::spa
       AppendCell<D>(structure, v, output_index, workspace, is_wanted, out);
     });
   };
-  // Of the scratch space, what every thread has for each node.
+  // The part of the scratch space that every thread has for each node of the tree.
   const uint64_t seen_bytes =
       static_cast<uint64_t>(ThreadTeam(threads).threads()) * structure.tree().node_count() * sizeof(uint32_t);
   return JoinBlocks<D, Workspace<D>>(

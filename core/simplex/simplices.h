@@ -25,7 +25,7 @@ struct Simplices {
 };
 
 // Each simplex once, in the order of the vertices along the Z curve of the tree, which threads share out in blocks:
-// those that each vertex lists; or, if `stars` is not complete, the nodes of its whole cell where it has the lowest
+// simplices that each vertex lists; or, if `stars` is not complete, the nodes of its whole cell where it has the lowest
 // output index of them.
 //
 // Shapes:     output_index: vertex_count entries, a permutation: the index in the output of each vertex.
@@ -36,12 +36,12 @@ struct Simplices {
 // Complexity: O(m) for m vertices in a refined structure; no leaf is looked at if `stars` is complete.
 // Errors:     RESOURCE_EXHAUSTED of the context's memory; CANCELLED, DEADLINE_EXCEEDED.
 // Threads:    uses `threads`, at most as many as the machine has cores.
-// Source:     [HT08] §1 and §2; what is listed and what of it counts: docs/design/simplex.md.
+// Source:     [HT08] §1 and §2; the lists, and the entries that count: docs/design/simplex.md.
 template <int D>
 absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, const StarLists<D>& stars,
                                            std::span<const uint32_t> output_index, int threads, RunContext& context);
 
-// Those vertices whose stars an insertion of the vertices from `first_new` on can have changed: these, and all that now
+// The vertices whose stars an insertion of the vertices from `first_new` on can have changed: these, and all that now
 // share a simplex with one. (A vertex without a new neighbour has the cell that it had.) Ascending.
 //
 // Complexity: O(1) for each new vertex in a refined structure.

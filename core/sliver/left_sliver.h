@@ -21,7 +21,7 @@ struct LeftSliver {
   SliverReason reason = SliverReason::kDemands;
 };
 
-// So many are named at most, the flattest.
+// The most slivers that are named, the flattest ones.
 inline constexpr size_t kMostNamedSlivers = 10;
 
 }  // namespace wellspace::core

@@ -1,4 +1,4 @@
-// Which side of a simplex's sphere a point is on, for many points: what depends on the simplex alone is computed once.
+// The side of a simplex's sphere that a point is on, for many points: terms of the simplex alone are computed once.
 #ifndef WELLSPACE_CORE_SLIVER_LIFTED_PLANE_H_
 #define WELLSPACE_CORE_SLIVER_LIFTED_PLANE_H_
 
@@ -44,8 +44,8 @@ class LiftedPlane {
     bound_ = BoundOf(largest);
   }
 
-  // That of the simplex with `origin` and its weight, whose cofactors have been computed; `largest`: no coordinate of
-  // an edge is larger.
+  // The plane of the simplex with `origin` and its weight, whose cofactors have been computed; `largest`: no coordinate
+  // of an edge is larger.
   LiftedPlane(const Point<D>& origin, double origin_weight, const std::array<double, D + 1>& cofactors, double largest)
       : origin_(origin),
         cofactors_(cofactors),

@@ -136,7 +136,7 @@ WELLSPACE_INLINE std::optional<LinkColumns::Tetrahedron> LinkColumns::WrapWith(u
   if ((in_doubt & ~own) != 0) {
     return std::nullopt;
   }
-  // Relative to the first vertex, not to the one that has been taken out.
+  // Relative to the first vertex, not to the vertex that has been taken out.
   for (int i = 0; i < 3; ++i) {
     cofactors[i] += 2 * cofactors[3] * origin[i];
   }

@@ -37,7 +37,7 @@ class LinkColumns {
   // Errors:     none.
   // Source:     gift wrapping: that sphere has the centre that is the least far beyond the facet.
   std::optional<Tetrahedron> Wrap(uint32_t a, uint32_t b, uint32_t c) const { return Wrap(a, b, c, BestVectorUnit()); }
-  // The same with that unit, for tests. REQUIRES: Has(unit).
+  // Wrap with that unit, for tests. REQUIRES: Has(unit).
   std::optional<Tetrahedron> Wrap(uint32_t a, uint32_t b, uint32_t c, VectorUnit unit) const;
 
  private:

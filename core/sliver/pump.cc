@@ -89,7 +89,7 @@ class Pump {
   explicit Pump(Triangulation<D>& triangulation) : triangulation_(triangulation) {}
 
   // Gives `v` the best weight in [0, limit], if its star has a simplex flatter than `poor`. Returns whether it is
-  // another than before. A corner of the box keeps what it has got once.
+  // another than before. A corner of the box keeps the first weight that it has got.
   bool SetBest(VertexId v, double limit, double poor) {
     const double old = triangulation_.weight(v);
     if (old > 0 && IsCorner(v)) {
@@ -151,7 +151,7 @@ class Pump {
     return vertices;
   }
   bool IsPoor(SimplexId s, double poor) const { return FlatnessOf<D>(triangulation_.Corners(s)) > poor; }
-  // Of the box.
+  // Whether `v` is a corner of the box.
   bool IsCorner(VertexId v) const { return std::popcount(triangulation_.faces(v)) == D; }
 
   // Gives `u` one weight after the other, and those around it and `v` that have a poor star then the best, until it
@@ -294,7 +294,7 @@ class Pump {
     if (chosen == 0) {
       return;
     }
-    // What rounding made of the events decides nothing: the star under the weight is found exactly.
+    // Rounding of the events decides nothing: the star under the weight is found exactly.
     triangulation_.FindCavityOfWeight(v, chosen, cavity_);
     double exact = -std::numeric_limits<double>::infinity();
     for (const auto& [s, slot] : cavity_.boundary) {

@@ -3,23 +3,24 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
 #include "core/simplex/quality.h"
+#include "core/sliver/surface_carrier.h"
 
 namespace wellspace::core {
 namespace {
 
 // Where a place may have any angles.
 constexpr double kNoLimit = std::numeric_limits<double>::infinity();
-// In the place of a cosine: at or above every limit.
+// In the place of a cosine: below every limit, and at or above it.
+constexpr double kUncounted = -1;
 constexpr double kNotAdmissible = std::numeric_limits<double>::infinity();
 
-// Sections are those of docs/design/sliver.md that say what a constant does, and what was measured with it.
+// Sections are those of docs/design/sliver.md that explain a constant, and have its measurements.
 
 // A vertex moves by at most this times the distance to its nearest neighbour. "Repair", step 1: 94 of 100 moves
 // succeed with it.
@@ -38,7 +39,7 @@ constexpr int kPasses = 40;
 constexpr int kEarlyPasses = 4;
 constexpr size_t kGrowth = 8;
 constexpr size_t kLeastGrowth = 1000;
-// As many vertices whose stars have changed are told of at once, so that those that change again and again are told of
+// The most vertices whose changed stars are told of at once, so that those that change again and again are told of
 // seldom.
 constexpr size_t kMostChanged = 1 << 16;
 // A vertex of more simplices is not moved: taking it out costs their square, and a place good for all hardly exists.
@@ -47,55 +48,28 @@ constexpr size_t kMostStar = 128;
 // "Repair", "Work is bounded": a torus at rho = 10 took more than a minute without, and 4 s with them.
 constexpr size_t kMany = 1000;
 constexpr double kFewGone = 0.125;
-// A determinant below this times the cube of the extent leaves too few bits of the circumcentre.
-constexpr double kExactBelow = 0x1p-24;
 // Simplices that one thread measures one after the other.
 constexpr size_t kBlock = 1 << 14;
 // A step that leaves a sliver has to make 1 - cosine, nearly half the angle squared, larger by this. "Repair": it keeps
 // steps from being many; other values have not been measured.
 constexpr double kGain = 1.1;
 
-// Slightly below the cosine of the angle, and the same on every machine: cosines of different libraries differ in the
-// last bit.
-double FlatCosine(double degrees) {
-  return std::ldexp(std::floor(std::ldexp(std::cos(degrees * std::numbers::pi / 180), 30)) - 1, -30);
-}
-
 bool IsBetter(double cosine, double than) { return 1 - cosine >= kGain * (1 - than); }
-
-// The cosine by which a tetrahedron is a sliver or not. One without area has no angles in doubles, and is flat.
-double FlatnessOf(const TetrahedronMeasure& measure) { return std::isnan(measure.cosine) ? 1 : measure.cosine; }
-
-// As MeasureTetrahedron, but with the exact circumsphere. Four points of a circle, rounded, span a volume that doubles
-// do not see, and their sphere is one of a pencil; it is empty, and its radius bounded by rho, all the same.
-TetrahedronMeasure MeasureSliver(const Simplex<3>& corners) {
-  TetrahedronMeasure measure = MeasureTetrahedron(corners);
-  double extent_sq = 0;
-  for (int i = 1; i < 4; ++i) {
-    extent_sq = std::max(extent_sq, DistanceSq<3>(corners[0], corners[i]));
-  }
-  if (!(measure.determinant > kExactBelow * extent_sq * std::sqrt(extent_sq))) {
-    const Point<3> offset = CircumcentreOffset<3>(corners);
-    for (int i = 0; i < 3; ++i) {
-      measure.centre[i] = corners[0][i] + offset[i];
-    }
-    measure.radius_sq = NormSq<3>(offset);
-  }
-  measure.cosine = FlatnessOf(measure);
-  return measure;
-}
 
 }  // namespace
 
-Repairer::Repairer(Triangulation<3>& triangulation, std::vector<bool>& is_fixed, const RepairCriteria& criteria,
-                   RepairObserver& observer)
+template <VertexCarrier Carrier>
+Repairer<Carrier>::Repairer(Triangulation<3>& triangulation, Carrier& carrier, std::vector<bool>& is_fixed,
+                            const RepairCriteria& criteria, RepairObserver& observer)
     : triangulation_(triangulation),
+      carrier_(carrier),
       is_fixed_(is_fixed),
       criteria_(criteria),
       observer_(observer),
       flat_cosine_(FlatCosine(criteria.min_dihedral)) {}
 
-absl::Status Repairer::Run(int threads, RunContext& context) {
+template <VertexCarrier Carrier>
+absl::Status Repairer<Carrier>::Run(int threads, RunContext& context) {
   try {
     const absl::Status status = RunPasses(threads, context);
     ReportStars();
@@ -106,13 +80,14 @@ absl::Status Repairer::Run(int threads, RunContext& context) {
   }
 }
 
-// What pass `pass` may do where `left` slivers are left to it:
+// The effort of pass `pass`, where `left` slivers are left to it:
 //   0         move the vertices of a sliver
 //   1         and those beyond its facets
 //   2 and 3   and add a vertex whose star is good
 //   4         the same, with more places the fewer slivers are left
 //   5 on      and add a vertex that has slivers, though better ones
-Repairer::Effort Repairer::EffortOf(int pass, size_t left) {
+template <VertexCarrier Carrier>
+auto Repairer<Carrier>::EffortOf(int pass, size_t left) -> Effort {
   Effort effort;
   effort.samples =
       pass < kEarlyPasses
@@ -124,7 +99,9 @@ Repairer::Effort Repairer::EffortOf(int pass, size_t left) {
   return effort;
 }
 
-absl::Status Repairer::RunPasses(int threads, RunContext& context) {
+template <VertexCarrier Carrier>
+absl::Status Repairer<Carrier>::RunPasses(int threads, RunContext& context) {
+  context_ = &context;
   if (criteria_.criteria.criterion == Criterion::kWellSpaced) {
     WELLSPACE_ASSIGN_OR_RETURN(nearest_sq_, triangulation_.NearestDistancesSq(context));
   }
@@ -134,8 +111,9 @@ absl::Status Repairer::RunPasses(int threads, RunContext& context) {
   int ahead = 0;  // passes that were skipped
   for (int at = 0; at < kPasses && !next_.empty() && HasWork(); ++at) {
     const int pass = at + ahead;
-    WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(observer_.MemoryBytes() + triangulation_.MemoryBytes() +
-                                                  cosine_.size() * sizeof(double) + next_.size() * sizeof(Sliver)));
+    WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(observer_.MemoryBytes() + carrier_.MemoryBytes() +
+                                                  triangulation_.MemoryBytes() + cosine_.size() * sizeof(double) +
+                                                  next_.size() * sizeof(Sliver)));
     const Effort effort = EffortOf(pass, next_.size());
     const size_t begun = next_.size();
     const size_t limit = kGrowth * begun + kLeastGrowth;
@@ -170,7 +148,8 @@ absl::Status Repairer::RunPasses(int threads, RunContext& context) {
 }
 
 // Says why slivers are left, and names the flattest.
-void Repairer::ExplainLeft() {
+template <VertexCarrier Carrier>
+void Repairer<Carrier>::ExplainLeft() {
   const bool has_work = HasWork();
   std::vector<std::pair<Sliver, SliverReason>> left;
   for (const Sliver& sliver : next_) {
@@ -193,14 +172,16 @@ void Repairer::ExplainLeft() {
 }
 
 // Whether a place in the sliver's circumball keeps the criteria, whatever the angles there.
-SliverReason Repairer::ReasonOf(const Sliver& sliver) {
-  const TetrahedronMeasure measure = MeasureSliver(triangulation_.Corners(sliver.simplex));
+template <VertexCarrier Carrier>
+SliverReason Repairer<Carrier>::ReasonOf(const Sliver& sliver) {
+  const TetrahedronMeasure measure = MeasureFlatTetrahedron(triangulation_.Corners(sliver.simplex));
   const VertexId v{triangulation_.vertex_count()};
   suspects_.clear();
+  hole_.clear();
   for (int k = 0; k < kSamples; ++k) {
     const Point<3> p = DrawInBall(measure, k == 0);
-    if (triangulation_.box().Contains(p) && triangulation_.box().FacesOf(p) == 0 &&
-        triangulation_.IsInConflict(sliver.simplex, p) && TryAt(sliver.simplex, p, v, kNoLimit).has_value()) {
+    if (carrier_.MayHold(triangulation_, p) && triangulation_.IsInConflict(sliver.simplex, p) &&
+        TryAt(sliver.simplex, p, v, kNoLimit).has_value() && Accepts(v, p)) {
       return SliverReason::kAngle;
     }
   }
@@ -208,9 +189,10 @@ SliverReason Repairer::ReasonOf(const Sliver& sliver) {
 }
 
 // A place in the shrunk circumball, or its centre.
-Point<3> Repairer::DrawInBall(const TetrahedronMeasure& measure, bool is_centre) {
+template <VertexCarrier Carrier>
+Point<3> Repairer<Carrier>::DrawInBall(const TetrahedronMeasure& measure, bool is_centre) {
   const double radius = kInside * std::sqrt(measure.radius_sq);
-  Point<3> p = is_centre ? Point<3>{} : RandomInBall();
+  Point<3> p = is_centre ? Point<3>{} : draws_.Next();
   for (int i = 0; i < 3; ++i) {
     p[i] = measure.centre[i] + radius * p[i];
   }
@@ -218,17 +200,19 @@ Point<3> Repairer::DrawInBall(const TetrahedronMeasure& measure, bool is_centre)
 }
 
 // Measures all simplices, and lists the slivers among them.
-absl::Status Repairer::FindSlivers(int threads, const RunContext& context) {
+template <VertexCarrier Carrier>
+absl::Status Repairer<Carrier>::FindSlivers(int threads, const RunContext& context) {
   cosine_.resize(triangulation_.simplex_limit());
   ThreadTeam team(threads);
   WELLSPACE_RETURN_IF_ERROR(team.TryForEach((cosine_.size() + kBlock - 1) / kBlock, [&](size_t block) {
     const size_t end = std::min(cosine_.size(), (block + 1) * kBlock);
     for (size_t i = block * kBlock; i < end; ++i) {
       const SimplexId s{static_cast<uint32_t>(i)};
-      cosine_[i] = triangulation_.IsIn(s) ? FlatnessOf(MeasureTetrahedron(triangulation_.Corners(s))) : -1;
+      cosine_[i] = triangulation_.IsIn(s) ? CountedCosine(triangulation_.Corners(s)) : kUncounted;
     }
     return context.Check();
   }));
+  NoteSmallestAngle();
   next_.clear();
   for (size_t i = 0; i < cosine_.size(); ++i) {
     if (cosine_[i] > flat_cosine_) {
@@ -239,20 +223,49 @@ absl::Status Repairer::FindSlivers(int threads, const RunContext& context) {
   return absl::OkStatus();
 }
 
-bool Repairer::IsThere(const Sliver& sliver) const {
+template <VertexCarrier Carrier>
+bool Repairer<Carrier>::IsThere(const Sliver& sliver) const {
   return triangulation_.IsIn(sliver.simplex) && triangulation_.item(sliver.simplex).vertices == sliver.vertices &&
          CosineOf(sliver.simplex) > flat_cosine_;
 }
 
+// The cosine by which a tetrahedron of the triangulation is a sliver or not.
+template <VertexCarrier Carrier>
+double Repairer<Carrier>::CountedCosine(const Simplex<3>& corners) const {
+  return carrier_.IsMeshed(corners) ? FlatnessOf(MeasureTetrahedron(corners)) : kUncounted;
+}
+
+// The cosine of a tetrahedron that a step would make; none if it is not below `limit`, or the criteria do not allow for
+// the tetrahedron. `moved` as for IsAdmissible.
+template <VertexCarrier Carrier>
+std::optional<double> Repairer<Carrier>::Judge(const Simplex<3>& corners, const std::array<VertexId, 4>& vertices,
+                                               VertexId moved, double limit) const {
+  const TetrahedronMeasure measure = MeasureTetrahedron(corners);
+  if constexpr (!Carrier::kMeshesAll) {
+    if (!carrier_.IsMeshed(corners)) {
+      return HasShape(measure, carrier_.OutsideRho(corners)) ? std::optional(kUncounted) : std::nullopt;
+    }
+  }
+  return measure.cosine < limit && IsAdmissible(measure, vertices, moved) ? std::optional(measure.cosine)
+                                                                          : std::nullopt;
+}
+
+// Whether a tetrahedron has at most that radius-edge ratio, edges that are long enough, and its centre in the box.
+template <VertexCarrier Carrier>
+bool Repairer<Carrier>::HasShape(const TetrahedronMeasure& measure, double rho) const {
+  // Comparisons with NaN fail.
+  return measure.determinant > 0 && measure.radius_sq <= rho * rho * measure.edge_sq &&
+         measure.edge_sq >= criteria_.min_edge * criteria_.min_edge && triangulation_.box().Contains(measure.centre);
+}
+
 // Whether the criteria allow for a tetrahedron, of which `moved` is the vertex whose nearest neighbour is as far
 // as edge_limit_sq_ says.
-bool Repairer::IsAdmissible(const TetrahedronMeasure& measure, const std::array<VertexId, 4>& vertices,
-                            VertexId moved) const {
+template <VertexCarrier Carrier>
+bool Repairer<Carrier>::IsAdmissible(const TetrahedronMeasure& measure, const std::array<VertexId, 4>& vertices,
+                                     VertexId moved) const {
   const MeshCriteria<3>& criteria = criteria_.criteria;
   const double rho_sq = criteria.rho * criteria.rho;
-  // Comparisons with NaN fail.
-  if (!(measure.determinant > 0 && measure.radius_sq <= rho_sq * measure.edge_sq &&
-        measure.edge_sq >= criteria_.min_edge * criteria_.min_edge && triangulation_.box().Contains(measure.centre))) {
+  if (!HasShape(measure, criteria.rho)) {
     return false;
   }
   if (criteria.criterion == Criterion::kWellSpaced) {
@@ -267,7 +280,8 @@ bool Repairer::IsAdmissible(const TetrahedronMeasure& measure, const std::array<
 
 // The squared distance of a vertex at `p`, which would replace the cavity, to its nearest neighbour; none if it would
 // become the nearest neighbour of another vertex.
-std::optional<double> Repairer::NewNearestSq(const Point<3>& p, VertexId moved) const {
+template <VertexCarrier Carrier>
+std::optional<double> Repairer<Carrier>::NewNearestSq(const Point<3>& p, VertexId moved) const {
   double new_nearest_sq = std::numeric_limits<double>::infinity();
   for (const auto& [s, slot] : cavity_.boundary) {
     const auto& vertices = triangulation_.item(s).vertices;
@@ -286,22 +300,20 @@ std::optional<double> Repairer::NewNearestSq(const Point<3>& p, VertexId moved) 
 
 // The largest cosine of the tetrahedron that vertex `v` at `p` makes with a facet; none if it is not below `limit`, or
 // the criteria do not allow for it.
-std::optional<double> Repairer::TryFacet(const Cavity::Facet& facet, const Point<3>& p, VertexId v,
-                                         double limit) const {
+template <VertexCarrier Carrier>
+std::optional<double> Repairer<Carrier>::TryFacet(const Cavity::Facet& facet, const Point<3>& p, VertexId v,
+                                                  double limit) const {
   std::array<VertexId, 4> vertices = triangulation_.item(facet.simplex).vertices;
   Simplex<3> corners = triangulation_.Corners(facet.simplex);
   vertices[facet.slot] = v;
   corners[facet.slot] = p;
-  const TetrahedronMeasure measure = MeasureTetrahedron(corners);
-  if (measure.cosine < limit && IsAdmissible(measure, vertices, v)) {
-    return measure.cosine;
-  }
-  return std::nullopt;
+  return Judge(corners, vertices, v, limit);
 }
 
 // The largest cosine in the star of vertex `v` at `p`, which is in conflict with `from`; none if one is not below
 // `limit`, or the criteria do not allow for it. Else the cavity has been found.
-std::optional<double> Repairer::TryAt(SimplexId from, const Point<3>& p, VertexId v, double limit) {
+template <VertexCarrier Carrier>
+std::optional<double> Repairer<Carrier>::TryAt(SimplexId from, const Point<3>& p, VertexId v, double limit) {
   edge_limit_sq_ = std::numeric_limits<double>::infinity();
   if (FailsAtSuspect(p, v, limit)) {
     return std::nullopt;
@@ -336,7 +348,8 @@ std::optional<double> Repairer::TryAt(SimplexId from, const Point<3>& p, VertexI
 
 // Whether the boundary of the cavity of `p` surely has a facet for which TryAt returns none: one for which it did
 // lately.
-bool Repairer::FailsAtSuspect(const Point<3>& p, VertexId v, double limit) {
+template <VertexCarrier Carrier>
+bool Repairer<Carrier>::FailsAtSuspect(const Point<3>& p, VertexId v, double limit) {
   for (auto facet = suspects_.begin(); facet != suspects_.end(); ++facet) {
     const SimplexId beyond = triangulation_.item(facet->simplex).neighbours[facet->slot];
     if (beyond != kNoSimplex && triangulation_.IsInConflict(facet->simplex, p) &&
@@ -349,7 +362,8 @@ bool Repairer::FailsAtSuspect(const Point<3>& p, VertexId v, double limit) {
 }
 
 // Measures new tetrahedra; slivers among them will be looked at.
-void Repairer::Note(std::span<const SimplexId> created) {
+template <VertexCarrier Carrier>
+void Repairer<Carrier>::Note(std::span<const SimplexId> created) {
   cosine_.resize(triangulation_.simplex_limit());
   is_changed_.resize(triangulation_.vertex_count());
   for (const SimplexId s : created) {
@@ -360,7 +374,7 @@ void Repairer::Note(std::span<const SimplexId> created) {
         changed_.push_back(v);
       }
     }
-    cosine_[Index(s)] = FlatnessOf(MeasureTetrahedron(triangulation_.Corners(s)));
+    cosine_[Index(s)] = CountedCosine(triangulation_.Corners(s));
     if (CosineOf(s) > flat_cosine_) {
       next_.push_back({s, vertices});
     }
@@ -368,7 +382,8 @@ void Repairer::Note(std::span<const SimplexId> created) {
 }
 
 // Tells whose stars have changed since the last time.
-void Repairer::ReportStars() {
+template <VertexCarrier Carrier>
+void Repairer<Carrier>::ReportStars() {
   for (const VertexId v : changed_) {
     is_changed_[Index(v)] = false;
     observer_.StarChanged(v);
@@ -376,25 +391,11 @@ void Repairer::ReportStars() {
   changed_.clear();
 }
 
-// SplitMix64: Steele, Lea and Flood 2014.
-Point<3> Repairer::RandomInBall() {
-  Point<3> p;
-  do {
-    for (double& x : p) {
-      random_ += 0x9e3779b97f4a7c15;
-      uint64_t z = random_;
-      z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9;
-      z = (z ^ (z >> 27)) * 0x94d049bb133111eb;
-      x = static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-52 - 1;
-    }
-  } while (NormSq<3>(p) > 1);
-  return p;
-}
-
 // Moves vertices of the sliver, or next to it. Returns whether the sliver has gone.
-bool Repairer::MoveVertices(const Sliver& sliver, const Effort& effort) {
+template <VertexCarrier Carrier>
+bool Repairer<Carrier>::MoveVertices(const Sliver& sliver, const Effort& effort) {
   for (const VertexId v : sliver.vertices) {
-    if (!is_fixed_[Index(v)] && Move(v, sliver, effort.samples)) {
+    if (MayMove(v) && Move(v, sliver, effort.samples)) {
       return true;
     }
   }
@@ -403,7 +404,7 @@ bool Repairer::MoveVertices(const Sliver& sliver, const Effort& effort) {
     if (beyond != kNoSimplex) {
       const auto& item = triangulation_.item(beyond);
       const VertexId v = item.vertices[item.SlotOf(sliver.simplex)];
-      if (!is_fixed_[Index(v)] && Move(v, sliver, effort.samples)) {
+      if (MayMove(v) && Move(v, sliver, effort.samples)) {
         return true;
       }
     }
@@ -413,7 +414,8 @@ bool Repairer::MoveVertices(const Sliver& sliver, const Effort& effort) {
 
 // How `v` may move to do away with the sliver: nearby or, if it is no vertex of the sliver, on the way to the sliver's
 // circumcentre. None if v has too many simplices.
-std::optional<Repairer::Mover> Repairer::StartOf(VertexId v, const Sliver& sliver) {
+template <VertexCarrier Carrier>
+auto Repairer<Carrier>::StartOf(VertexId v, const Sliver& sliver) -> std::optional<Mover> {
   triangulation_.Star(v, star_);
   report_.operations += star_.size();
   if (star_.size() > kMostStar) {
@@ -422,9 +424,9 @@ std::optional<Repairer::Mover> Repairer::StartOf(VertexId v, const Sliver& slive
   Mover mover;
   mover.star_size = star_.size();
   mover.from = triangulation_.point(v);
-  mover.faces = triangulation_.faces(v);
+  mover.track = carrier_.TrackOf(triangulation_, v);
   mover.flattest = CosineOf(sliver.simplex);
-  double edge_sq = std::numeric_limits<double>::infinity();
+  double edge_sq = kNoLimit;
   for (const SimplexId s : star_) {
     mover.flattest = std::max(mover.flattest, CosineOf(s));
     for (const VertexId u : triangulation_.item(s).vertices) {
@@ -436,46 +438,44 @@ std::optional<Repairer::Mover> Repairer::StartOf(VertexId v, const Sliver& slive
   mover.reach = kReach * std::sqrt(edge_sq);
   mover.is_own = std::find(sliver.vertices.begin(), sliver.vertices.end(), v) != sliver.vertices.end();
   if (!mover.is_own) {
-    mover.way = Difference<3>(MeasureSliver(triangulation_.Corners(sliver.simplex)).centre, mover.from);
+    mover.way = Difference<3>(MeasureFlatTetrahedron(triangulation_.Corners(sliver.simplex)).centre, mover.from);
   }
   return mover;
 }
 
-// Takes `v` out, which has so many simplices, and measures what fills the hole.
-void Repairer::OpenHole(VertexId v, size_t star_size) {
+// Takes `v` out, which has so many simplices, and measures the filling of the hole.
+template <VertexCarrier Carrier>
+void Repairer<Carrier>::OpenHole(VertexId v, size_t star_size) {
   triangulation_.Remove(v, hole_);
   report_.operations += star_size * star_size;  // each facet of the hole is held to each neighbour
   hole_cosine_.clear();
   for (const SimplexId s : hole_) {
-    const TetrahedronMeasure measure = MeasureTetrahedron(triangulation_.Corners(s));
-    const bool is_admissible = IsAdmissible(measure, triangulation_.item(s).vertices, v);
-    hole_cosine_.push_back(is_admissible ? measure.cosine : kNotAdmissible);
+    hole_cosine_.push_back(
+        Judge(triangulation_.Corners(s), triangulation_.item(s).vertices, v, kNoLimit).value_or(kNotAdmissible));
   }
 }
 
-// The next place that is tried for a vertex.
-Point<3> Repairer::DrawPlaceFor(const Mover& mover) {
-  Point<3> p = RandomInBall();
-  const double share = mover.is_own ? 0 : 0.5 * (1 + RandomInBall()[0]);
+// The next place that is tried for a vertex, if that leads to one.
+template <VertexCarrier Carrier>
+std::optional<Point<3>> Repairer<Carrier>::DrawPlaceFor(const Mover& mover) {
+  Point<3> p = draws_.Next();
+  const double share = mover.is_own ? 0 : 0.5 * (1 + draws_.Next()[0]);
   for (int i = 0; i < 3; ++i) {
     p[i] = mover.from[i] + mover.reach * p[i] + share * mover.way[i];
   }
-  for (int face = 0; face < 6; ++face) {
-    if (((mover.faces >> face) & 1) != 0) {
-      p[face / 2] = triangulation_.box().FaceCoordinate(face);
-    }
-  }
-  return p;
+  return carrier_.Bring(triangulation_, mover.track, p);
 }
 
 // The simplex of the filling that is in conflict with `p`, if there is one.
-std::vector<SimplexId>::const_iterator Repairer::FirstInHole(const Point<3>& p) const {
+template <VertexCarrier Carrier>
+std::vector<SimplexId>::const_iterator Repairer<Carrier>::FirstInHole(const Point<3>& p) const {
   return std::find_if(hole_.begin(), hole_.end(), [&](SimplexId s) { return triangulation_.IsInConflict(s, p); });
 }
 
-// The largest cosine of what `v` at `p` makes and what is left of the filling then; none if it is not below `limit`,
+// The largest cosine of the simplices that `v` at `p` makes, and of the rest of the filling; none if not below `limit`,
 // or the criteria do not allow for it.
-std::optional<double> Repairer::TryInHole(VertexId v, const Point<3>& p, double limit) {
+template <VertexCarrier Carrier>
+std::optional<double> Repairer<Carrier>::TryInHole(VertexId v, const Point<3>& p, double limit) {
   for (size_t i = 0; i < hole_.size(); ++i) {
     if (hole_cosine_[i] >= limit && !triangulation_.IsInConflict(hole_[i], p)) {
       return std::nullopt;
@@ -492,29 +492,29 @@ std::optional<double> Repairer::TryInHole(VertexId v, const Point<3>& p, double 
   return worst;
 }
 
-// Looks for a better place of `v`, such that the sliver goes and all that replaces what the move destroys is better
-// than the flattest of that. Returns whether it has moved.
-bool Repairer::Move(VertexId v, const Sliver& sliver, int samples) {
+// Looks for a better place of `v`, such that the sliver goes and all new simplices are better than the flattest that
+// the move destroys. Returns whether it has moved.
+template <VertexCarrier Carrier>
+bool Repairer<Carrier>::Move(VertexId v, const Sliver& sliver, int samples) {
   const std::optional<Mover> mover = StartOf(v, sliver);
   if (!mover.has_value()) {
     return false;
   }
   OpenHole(v, mover->star_size);
   suspects_.clear();
-  const Box<3>& box = triangulation_.box();
   double best = mover->flattest;
   Point<3> to = mover->from;
-  for (int k = 0; k < samples && best > flat_cosine_; ++k) {
+  for (int k = 0; k < samples && best > flat_cosine_ && MayTry(k); ++k) {
     report_.operations += hole_.size();
-    const Point<3> p = DrawPlaceFor(*mover);
-    if (!box.Contains(p) || box.FacesOf(p) != mover->faces ||
-        (!mover->is_own && !triangulation_.IsInConflict(sliver.simplex, p))) {
+    const std::optional<Point<3>> p = DrawPlaceFor(*mover);
+    if (!p.has_value() || (!mover->is_own && !triangulation_.IsInConflict(sliver.simplex, *p))) {
       continue;
     }
-    const std::optional<double> worst = TryInHole(v, p, best);
-    if (worst.has_value() && *worst < best && (*worst <= flat_cosine_ || IsBetter(*worst, mover->flattest))) {
+    const std::optional<double> worst = TryInHole(v, *p, best);
+    if (worst.has_value() && *worst < best && (*worst <= flat_cosine_ || IsBetter(*worst, mover->flattest)) &&
+        Accepts(v, *p)) {
       best = *worst;
-      to = p;
+      to = *p;
     }
   }
   if (best == mover->flattest) {
@@ -530,25 +530,27 @@ bool Repairer::Move(VertexId v, const Sliver& sliver, int samples) {
   ++report_.moves;
   Note(hole_);
   Note(created_);
+  carrier_.Moved(triangulation_, v, NeighbourIn(created_.front(), v));
   observer_.VertexMoved(v);
   return true;
 }
 
-// Adds a vertex in the sliver's circumball: of the places whose star is good, that which does away with most slivers.
-absl::Status Repairer::Insert(const Sliver& sliver, const Effort& effort) {
-  const TetrahedronMeasure measure = MeasureSliver(triangulation_.Corners(sliver.simplex));
-  const Box<3>& box = triangulation_.box();
+// Adds a vertex in the sliver's circumball: of the places whose star is good, the one that removes most slivers.
+template <VertexCarrier Carrier>
+absl::Status Repairer<Carrier>::Insert(const Sliver& sliver, const Effort& effort) {
+  const TetrahedronMeasure measure = MeasureFlatTetrahedron(triangulation_.Corners(sliver.simplex));
   const VertexId v{triangulation_.vertex_count()};
   suspects_.clear();
+  hole_.clear();
   // Not found yet; else the best so far.
   uint64_t most = 0;
   double best = effort.may_insert_poor ? measure.cosine : flat_cosine_;
   const double limit = best;
   Point<3> to{};
-  for (int k = 0; k < effort.samples; ++k) {
+  for (int k = 0; k < effort.samples && MayTry(k); ++k) {
     const Point<3> p = DrawInBall(measure, k == 0);
     ++report_.operations;
-    if (!box.Contains(p) || box.FacesOf(p) != 0 || !triangulation_.IsInConflict(sliver.simplex, p)) {
+    if (!carrier_.MayHold(triangulation_, p) || !triangulation_.IsInConflict(sliver.simplex, p)) {
       continue;
     }
     const std::optional<double> found = TryAt(sliver.simplex, p, v, limit);
@@ -561,7 +563,10 @@ absl::Status Repairer::Insert(const Sliver& sliver, const Effort& effort) {
     // Good stars first, then many slivers gone, then the best angle.
     const bool is_good = worst <= flat_cosine_;
     const bool was_good = most > 0 && best <= flat_cosine_;
-    if (most == 0 || (is_good != was_good ? is_good : is_good && gone != most ? gone > most : worst < best)) {
+    if ((most == 0 || (is_good != was_good       ? is_good
+                       : is_good && gone != most ? gone > most
+                                                 : worst < best)) &&
+        Accepts(v, p)) {
       most = gone;
       best = worst;
       to = p;
@@ -584,9 +589,12 @@ absl::Status Repairer::Insert(const Sliver& sliver, const Effort& effort) {
   triangulation_.Insert(v, to, 0, cavity_, created_);
   ++report_.added;
   Note(created_);
-  const auto& vertices = triangulation_.item(created_.front()).vertices;
-  observer_.VertexAdded(v, vertices[vertices[0] == v ? 1 : 0]);
+  carrier_.Added(triangulation_, v, NeighbourIn(created_.front(), v));
+  observer_.VertexAdded(v, NeighbourIn(created_.front(), v));
   return absl::OkStatus();
 }
+
+template class Repairer<BoxCarrier>;
+template class Repairer<SurfaceCarrier>;
 
 }  // namespace wellspace::core

@@ -3,6 +3,7 @@
 #ifndef WELLSPACE_CORE_SLIVER_REPAIR_H_
 #define WELLSPACE_CORE_SLIVER_REPAIR_H_
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -14,9 +15,12 @@
 #include "core/base/memory/huge_pages.h"
 #include "core/base/run_context.h"
 #include "core/refine/criteria.h"
+#include "core/simplex/quality.h"
+#include "core/sliver/ball_draws.h"
 #include "core/sliver/left_sliver.h"
 #include "core/sliver/tetrahedron.h"
 #include "core/sliver/triangulation.h"
+#include "core/sliver/vertex_carrier.h"
 
 namespace wellspace::core {
 
@@ -28,11 +32,16 @@ struct RepairCriteria {
 };
 
 struct RepairReport {
-  uint64_t slivers = 0;       // found
-  uint64_t slivers_left = 0;  // that could not be repaired
-  uint64_t moves = 0;         // of vertices; one may move more than once
-  uint64_t added = 0;         // vertices
-  uint64_t operations = 0;    // tetrahedra that were measured, or that a vertex was tested against
+  // The work that is spent, however hard slivers are. Default parameters take a twentieth of it.
+  static constexpr uint64_t kMostOperations = 20'000;
+  static constexpr uint64_t kFreeSlivers = 2'000;
+
+  std::optional<double> min_angle_deg;  // of the meshed tetrahedra, before
+  uint64_t slivers = 0;                 // found
+  uint64_t slivers_left = 0;            // that could not be repaired
+  uint64_t moves = 0;                   // of vertices; one may move more than once
+  uint64_t added = 0;                   // vertices
+  uint64_t operations = 0;              // tetrahedra that were measured, or that a vertex was tested against
   // Once Run has succeeded: slivers_left by SliverReason, and at most kMostNamedSlivers of them, flattest first.
   std::array<uint64_t, kSliverReasons> left_by{};
   std::vector<LeftSliver> flattest_left;
@@ -48,32 +57,30 @@ class RepairObserver {
   virtual void VertexAdded(VertexId v, VertexId near) = 0;
   // The simplices of `v` are others than when this was called before.
   virtual void StarChanged(VertexId v) = 0;
-  // What is held in memory beside the triangulation.
+  // Memory held beside the triangulation. Unit: bytes.
   virtual uint64_t MemoryBytes() const = 0;
 };
 
-// Repairs the slivers of a Delaunay triangulation that keeps `criteria`.
+// Repairs the slivers of a Delaunay triangulation that keeps `criteria`, as far as it is meshed. The carrier says where
+// vertices may go.
 //
 // Thread safety: thread-compatible.
 // Invariants: after every step (1) the triangulation is that of Delaunay and keeps the criteria; (2) vertices that are
-// fixed are where they were, those on faces of the box on the same faces; (3) of the simplices that a step replaces and
-// makes, the flattest is made better.
+// fixed are where they were, others on their tracks; (3) of the meshed simplices that a step replaces and makes, the
+// flattest is made better; (4) the carrier has accepted the step.
+template <VertexCarrier Carrier>
 class Repairer {
  public:
-  // The work that is spent, however hard slivers are. Default parameters take a twentieth of it.
-  static constexpr uint64_t kMostOperations = 20'000;
-  static constexpr uint64_t kFreeSlivers = 2'000;
-
   // Shapes:     is_fixed: by vertex; true where it must not move. One entry is added for each vertex added.
-  Repairer(Triangulation<3>& triangulation, std::vector<bool>& is_fixed, const RepairCriteria& criteria,
-           RepairObserver& observer);
+  Repairer(Triangulation<3>& triangulation, Carrier& carrier, std::vector<bool>& is_fixed,
+           const RepairCriteria& criteria, RepairObserver& observer);
 
-  // Repairs what slivers there are, and what new ones that makes. Up to `threads` threads look for the first ones; one
+  // Repairs the slivers, and the new ones that this makes. Up to `threads` threads look for the first ones; one
   // thread repairs.
   //
   // Guarantees: (1) deterministic, and the same on any number of threads; (2) report().operations is at most
-  //             kMostOperations times the slivers found and kFreeSlivers more, and what one sliver takes at most;
-  //             (3) the report says of each sliver that is left why.
+  //             RepairReport::kMostOperations times the slivers found and kFreeSlivers more, and once more the most for
+  //             one sliver; (3) the report says of each sliver that is left why.
   // Complexity: O(1) expected for each sliver, and a look at every simplex.
   // Errors:     RESOURCE_EXHAUSTED (max_vertices, memory of the context), CANCELLED, DEADLINE_EXCEEDED; the invariants
   //             hold all the same.
@@ -83,11 +90,15 @@ class Repairer {
   const RepairReport& report() const { return report_; }
 
  private:
+  using Track = typename Carrier::Track;
+
   // A sliver by its number, and its vertices, for numbers are used again; and vertices move.
   struct Sliver {
     SimplexId simplex;
     std::array<VertexId, 4> vertices;
   };
+  // Places that are tried between two looks at the context.
+  static constexpr int kTriesPerCheck = 64;
   // How hard to try.
   struct Effort {
     int samples = 0;
@@ -100,50 +111,75 @@ class Repairer {
   struct Mover {
     Point<3> from{};
     size_t star_size = 0;  // its simplices
-    FaceMask faces = 0;    // that it stays on
+    Track track{};         // that it stays on
     double reach = 0;      // how far it may go beside its way
     bool is_own = false;   // a vertex of the sliver
     Point<3> way{};        // to the circumcentre of the sliver, if it is none
-    double flattest = 0;   // the largest cosine of what the move replaces
+    double flattest = 0;   // the largest cosine of the simplices that the move replaces
   };
 
   static Effort EffortOf(int pass, size_t left);
   absl::Status RunPasses(int threads, RunContext& context);
   absl::Status FindSlivers(int threads, const RunContext& context);
-  bool HasWork() const { return report_.operations < kMostOperations * (report_.slivers + kFreeSlivers); }
+  bool HasWork() const {
+    return report_.operations < RepairReport::kMostOperations * (report_.slivers + RepairReport::kFreeSlivers);
+  }
   void ExplainLeft();
   SliverReason ReasonOf(const Sliver& sliver);
   Point<3> DrawInBall(const TetrahedronMeasure& measure, bool is_centre);
   bool IsThere(const Sliver& sliver) const;
+  bool MayMove(VertexId v) const { return !is_fixed_[Index(v)] && carrier_.MayMove(v); }
   double CosineOf(SimplexId s) const { return cosine_[Index(s)]; }
+  double CountedCosine(const Simplex<3>& corners) const;
+  std::optional<double> Judge(const Simplex<3>& corners, const std::array<VertexId, 4>& vertices, VertexId moved,
+                              double limit) const;
   bool IsAdmissible(const TetrahedronMeasure& measure, const std::array<VertexId, 4>& vertices, VertexId moved) const;
+  bool HasShape(const TetrahedronMeasure& measure, double rho) const;
   std::optional<double> NewNearestSq(const Point<3>& p, VertexId moved) const;
   std::optional<double> TryFacet(const Cavity::Facet& facet, const Point<3>& p, VertexId v, double limit) const;
   bool FailsAtSuspect(const Point<3>& p, VertexId v, double limit);
   std::optional<double> TryAt(SimplexId from, const Point<3>& p, VertexId v, double limit);
+  VertexId NeighbourIn(SimplexId s, VertexId v) const {
+    const auto& vertices = triangulation_.item(s).vertices;
+    return vertices[vertices[0] == v ? 1 : 0];
+  }
+  // Notes the smallest angle of the meshed tetrahedra, once all are measured.
+  void NoteSmallestAngle() {
+    const auto flattest = std::max_element(cosine_.begin(), cosine_.end());
+    if (flattest != cosine_.end() && *flattest > -1) {
+      const SimplexId s{static_cast<uint32_t>(flattest - cosine_.begin())};
+      report_.min_angle_deg = Angles<3>(triangulation_.Corners(s)).min_deg;
+    }
+  }
+  // Whether place k may be tried: false if the run has been cancelled meanwhile, which RunPasses then says.
+  bool MayTry(int k) const { return k % kTriesPerCheck != 0 || k == 0 || context_->Check().ok(); }
+  bool Accepts(VertexId v, const Point<3>& p) {
+    return carrier_.Accepts(triangulation_, {.vertex = v, .to = p, .cavity = cavity_, .hole = hole_});
+  }
   void Note(std::span<const SimplexId> created);
   void ReportStars();
-  Point<3> RandomInBall();
 
   bool MoveVertices(const Sliver& sliver, const Effort& effort);
   std::optional<Mover> StartOf(VertexId v, const Sliver& sliver);
   void OpenHole(VertexId v, size_t star_size);
-  Point<3> DrawPlaceFor(const Mover& mover);
+  std::optional<Point<3>> DrawPlaceFor(const Mover& mover);
   std::vector<SimplexId>::const_iterator FirstInHole(const Point<3>& p) const;
   std::optional<double> TryInHole(VertexId v, const Point<3>& p, double limit);
   bool Move(VertexId v, const Sliver& sliver, int samples);
   absl::Status Insert(const Sliver& sliver, const Effort& effort);
 
   Triangulation<3>& triangulation_;
+  Carrier& carrier_;
   std::vector<bool>& is_fixed_;
   const RepairCriteria criteria_;
   RepairObserver& observer_;
-  double flat_cosine_ = 0;  // above it an angle is too small
+  const RunContext* context_ = nullptr;  // valid while it runs
+  double flat_cosine_ = 0;               // above it an angle is too small
   RepairReport report_;
   HugeVector<double> nearest_sq_;  // at most the squared distance to the nearest neighbour; for well-spaced only
-  HugeVector<double> cosine_;      // by simplex, of its smallest angle
+  HugeVector<double> cosine_;      // by simplex, of its smallest angle; kUncounted where it is not meshed
   HugeVector<Sliver> next_;        // to be looked at
-  uint64_t random_ = 0;
+  BallDraws draws_;
 
   // Scratch.
   Cavity cavity_;

@@ -10,8 +10,10 @@
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
 #include "core/base/thread_team.h"
+#include "core/refine/space/space_domain.h"
 #include "core/simplex/quality.h"
 #include "core/sliver/pump.h"
+#include "core/sliver/surface_carrier.h"
 #include "core/sliver/tetrahedron.h"
 
 namespace wellspace::core {
@@ -39,8 +41,8 @@ void Emit(const Triangulation<D>& triangulation, SimplexId s, std::span<const ui
   out.insert(out.end(), corners.begin(), corners.end());
 }
 
-// Puts simplices, lowest vertex first, into ascending order: that of the numbers of a triangulation, which decide what
-// is repaired first, is then one of the simplices alone.
+// Puts simplices, lowest vertex first, into ascending order: the numbers of a triangulation, which decide the order of
+// repair, then depend on the simplices alone.
 //
 // Complexity: O(vertices + simplices) and sorting the simplices of each lowest vertex.
 // Errors:     CANCELLED, DEADLINE_EXCEEDED.
@@ -101,9 +103,10 @@ class WorstSoFar {
 };
 
 // Has structure and refinement follow the triangulation step by step, so that repair may end after any of them.
+template <typename Domain>
 class Follower final : public RepairObserver {
  public:
-  Follower(Triangulation<3>& triangulation, QueryStructure<3>& structure, BoxRefinement<3>& refinement,
+  Follower(Triangulation<3>& triangulation, QueryStructure<3>& structure, Refinement<Domain>& refinement,
            std::vector<bool>& moved)
       : triangulation_(triangulation), structure_(structure), refinement_(refinement), moved_(moved) {}
 
@@ -135,7 +138,7 @@ class Follower final : public RepairObserver {
  private:
   Triangulation<3>& triangulation_;
   QueryStructure<3>& structure_;
-  BoxRefinement<3>& refinement_;
+  Refinement<Domain>& refinement_;
   std::vector<bool>& moved_;
   std::vector<SimplexId> star_;
 };
@@ -206,17 +209,21 @@ absl::Status SliverStage<D>::FollowStructure(const QueryStructure<D>& structure,
 }
 
 template <int D>
-template <int E>
-absl::Status SliverStage<D>::Repair(QueryStructure<E>& structure, BoxRefinement<E>& refinement,
+template <typename Domain, VertexCarrier Carrier>
+absl::Status SliverStage<D>::Repair(QueryStructure<3>& structure, Refinement<Domain>& refinement, Carrier& carrier,
                                     std::vector<bool>& is_fixed, const RepairCriteria& criteria,
-                                    std::vector<bool>& moved, int threads, RunContext& context) requires(E == 3) {
+                                    std::vector<bool>& moved, int threads,
+                                    RunContext& context) requires(D == 3 && Domain::kDimension == 3) {
   const Stopwatch stopwatch(statistics_.seconds, statistics_.star_seconds);
   statistics_.is_asked = true;
   WELLSPACE_RETURN_IF_ERROR(FollowStructure(structure, refinement.stars(), threads, context));
   context.EnterPhase(Phase::kSlivers);
-  Follower follower(*triangulation_, structure, refinement, moved);
-  Repairer repairer(*triangulation_, is_fixed, criteria, follower);
+  Follower<Domain> follower(*triangulation_, structure, refinement, moved);
+  Repairer<Carrier> repairer(*triangulation_, carrier, is_fixed, criteria, follower);
   const absl::Status status = repairer.Run(threads, context);
+  if (!Carrier::kMeshesAll && statistics_.moves + statistics_.added == 0 && repairer.report().min_angle_deg) {
+    statistics_.min_angle_deg = repairer.report().min_angle_deg;  // tetrahedra that are not meshed have other angles
+  }
   statistics_.slivers += repairer.report().slivers;
   statistics_.slivers_left = repairer.report().slivers_left;
   statistics_.left_by = repairer.report().left_by;
@@ -241,7 +248,7 @@ absl::StatusOr<WeightedSimplices> SliverStage<D>::ToSimplices(const QueryStructu
   }
   std::optional<Triangulation<D>> pumped;
   if (pump) {
-    // What is repaired later has no weights, and is triangulated anew.
+    // A later repair works without weights, on a triangulation made anew.
     if (triangulation_.has_value()) {
       pumped = std::exchange(triangulation_, std::nullopt);
     } else {
@@ -283,7 +290,10 @@ template class SliverStage<3>;
 template class SliverStage<4>;
 template class SliverStage<5>;
 template class SliverStage<6>;
-template absl::Status SliverStage<3>::Repair(QueryStructure<3>&, BoxRefinement<3>&, std::vector<bool>&,
+template absl::Status SliverStage<3>::Repair(QueryStructure<3>&, Refinement<SpaceDomain>&, SurfaceCarrier&,
+                                             std::vector<bool>&, const RepairCriteria&, std::vector<bool>&, int,
+                                             RunContext&);
+template absl::Status SliverStage<3>::Repair(QueryStructure<3>&, BoxRefinement<3>&, BoxCarrier&, std::vector<bool>&,
                                              const RepairCriteria&, std::vector<bool>&, int, RunContext&);
 
 }  // namespace wellspace::core

@@ -15,15 +15,16 @@
 #include "core/simplex/simplices.h"
 #include "core/sliver/repair.h"
 #include "core/sliver/triangulation.h"
+#include "core/sliver/vertex_carrier.h"
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {
 
-// Over the life of a stage.
+// The figures of a stage, over its life.
 struct SliverStatistics {
   uint64_t slivers = 0;       // that Repair found
   uint64_t slivers_left = 0;  // by the last Repair
-  // Of these: see RepairReport.
+  // Of `slivers_left`: see RepairReport.
   std::array<uint64_t, kSliverReasons> left_by{};
   std::vector<LeftSliver> flattest_left;
   uint64_t operations = 0;  // of Repair
@@ -42,7 +43,7 @@ struct WeightedSimplices {
   HugeVector<double> weights;  // by output index, in the structure's unit; empty where all are zero
 };
 
-// Keeps the Delaunay triangulation of a structure while its mesh is repaired, and follows what is added to the
+// Keeps the Delaunay triangulation of a structure while its mesh is repaired, and adds vertices that come to the
 // structure in between. D >= 3.
 //
 // Thread safety: thread-compatible.
@@ -50,7 +51,8 @@ struct WeightedSimplices {
 template <int D>
 class SliverStage {
  public:
-  // Repairs the slivers, and tells structure and refinement what has changed, on an error too. 3-D.
+  // Repairs the slivers, and tells structure and refinement of the changes, on an error too. `carrier` says where
+  // vertices may go: the carrier of the domain that is refined. 3-D.
   //
   // Shapes:     moved: vertices below its size that move are set in it.
   // REQUIRES:   the structure is refined for criteria.criteria; is_fixed has an entry for each of its vertices.
@@ -59,11 +61,10 @@ class SliverStage {
   // Errors:     RESOURCE_EXHAUSTED (max_vertices, memory of the context), CANCELLED, DEADLINE_EXCEEDED; all stays
   //             usable.
   // Threads:    uses `threads` for the stars that the triangulation is made of.
-  // A template, since clang 14 would instantiate it in other dimensions otherwise.
-  template <int E = D>
-  absl::Status Repair(QueryStructure<E>& structure, BoxRefinement<E>& refinement, std::vector<bool>& is_fixed,
-                      const RepairCriteria& criteria, std::vector<bool>& moved, int threads,
-                      RunContext& context) requires(E == 3);
+  template <typename Domain, VertexCarrier Carrier>
+  absl::Status Repair(QueryStructure<3>& structure, Refinement<Domain>& refinement, Carrier& carrier,
+                      std::vector<bool>& is_fixed, const RepairCriteria& criteria, std::vector<bool>& moved,
+                      int threads, RunContext& context) requires(D == 3 && Domain::kDimension == 3);
 
   // The simplices of the repaired mesh; with `pump`, of its regular triangulation under pumped weights. Order and form
   // of the simplices are independent of the number of threads.
@@ -76,15 +77,15 @@ class SliverStage {
                                                 std::span<const uint32_t> output_index, bool pump, int threads,
                                                 RunContext& context);
 
-  // What the stage takes at its peak, beside the structure and a mesh.
+  // Peak memory of the stage, beside the structure and a mesh. Unit: bytes.
   static uint64_t EstimateBytes(uint64_t vertices, uint64_t simplices) {
     return vertices * sizeof(Point<D>) + Triangulation<D>::BuildBytes(vertices, simplices);
   }
 
-  // What the stage takes in memory.
+  // Memory of the stage. Unit: bytes.
   uint64_t MemoryBytes() const { return triangulation_.has_value() ? triangulation_->MemoryBytes() : 0; }
   bool HasTriangulation() const { return triangulation_.has_value(); }
-  // Lets go of the triangulation, and of what is left. To be called when the structure changes and Repair will not.
+  // Drops the triangulation, and the slivers that were left. To be called when the structure changes without Repair.
   void Forget() {
     triangulation_.reset();
     statistics_.slivers_left = 0;

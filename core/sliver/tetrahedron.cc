@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+
+#include "core/simplex/quality.h"
 
 // Vectors that are passed and returned never are: all that does so is compiled into its callers.
 #pragma GCC diagnostic ignored "-Wpsabi"
@@ -12,6 +15,8 @@ namespace {
 using Lanes = Wide<4>::Lanes;
 using Mask = Wide<4>::Mask;
 constexpr int kAny = 0;  // a lane that is not used
+// A determinant below this times the cube of the extent leaves too few bits of the circumcentre.
+constexpr double kExactBelow = 0x1p-24;
 
 struct Vectors {
   Lanes x, y, z;
@@ -27,7 +32,7 @@ WELLSPACE_INLINE Lanes SquareRoots(const Lanes& x) {
 
 WELLSPACE_INLINE TetrahedronMeasure Measure(const Simplex<3>& corners) {
   const auto& [origin, a, b, c] = corners;
-  // The edges from the first corner, and what each has before it in a cross product; the same order for corners.
+  // The edges from the first corner, and the other factor of each in a cross product; the same order for corners.
   const Mask next = {1, 2, 0, kAny};
   const Vectors ends = {{b[0], c[0], a[0], 0}, {b[1], c[1], a[1], 0}, {b[2], c[2], a[2], 0}};
   const Vectors edges = {ends.x - origin[0], ends.y - origin[1], ends.z - origin[2]};
@@ -79,6 +84,27 @@ TetrahedronMeasure MeasureTetrahedron(const Simplex<3>& corners) {
 
 TetrahedronMeasure MeasureTetrahedron(const Simplex<3>& corners, VectorUnit unit) {
   return unit == VectorUnit::kAvx2 ? MeasureAvx2(corners) : Measure(corners);
+}
+
+double FlatCosine(double degrees) {
+  return std::ldexp(std::floor(std::ldexp(std::cos(degrees * std::numbers::pi / 180), 30)) - 1, -30);
+}
+
+TetrahedronMeasure MeasureFlatTetrahedron(const Simplex<3>& corners) {
+  TetrahedronMeasure measure = MeasureTetrahedron(corners);
+  double extent_sq = 0;
+  for (int i = 1; i < 4; ++i) {
+    extent_sq = std::max(extent_sq, DistanceSq<3>(corners[0], corners[i]));
+  }
+  if (!(measure.determinant > kExactBelow * extent_sq * std::sqrt(extent_sq))) {
+    const Point<3> offset = CircumcentreOffset<3>(corners);
+    for (int i = 0; i < 3; ++i) {
+      measure.centre[i] = corners[0][i] + offset[i];
+    }
+    measure.radius_sq = NormSq<3>(offset);
+  }
+  measure.cosine = FlatnessOf(measure);
+  return measure;
 }
 
 }  // namespace wellspace::core

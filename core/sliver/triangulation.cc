@@ -290,7 +290,7 @@ bool Triangulation<D>::IsInConflict(SimplexId s, const Point<D>& p, double weigh
   return IsInConflict(vertices, known.plane, p, weight);
 }
 
-// The same for a positively oriented simplex of `vertices`, which has that plane.
+// IsInConflict for a positively oriented simplex of `vertices`, which has that plane.
 template <int D>
 bool Triangulation<D>::IsInConflict(const std::array<VertexId, D + 1>& vertices, const LiftedPlane<D>& plane,
                                     const Point<D>& p, double weight) const {
@@ -569,7 +569,7 @@ std::array<uint32_t, D> Triangulation<D>::FacetOf(const std::array<uint32_t, D +
 
 template <int D>
 void Triangulation<D>::Restore() {
-  // The list of free numbers goes back to what it was, in reverse.
+  // The list of free numbers goes back to its earlier state, in reverse.
   for (auto it = filling_.rbegin(); it != filling_.rend(); ++it) {
     Free(*it);
   }

@@ -96,13 +96,13 @@ class Triangulation {
   // The faces of the box that the facet opposite to vertex `slot` of `s` lies on.
   FaceMask FacesOf(SimplexId s, int slot) const { return FacesOf(item(s).vertices, slot); }
 
-  // What it takes in memory, up to scratch.
+  // Memory of the triangulation, up to scratch. Unit: bytes.
   uint64_t MemoryBytes() const {
     return points_.size() * (sizeof(Point<D>) + sizeof(FaceMask) + sizeof(double) + sizeof(SimplexId)) +
            link_number_.size() * sizeof(uint32_t) + items_.size() * (sizeof(Item) + sizeof(uint32_t));
   }
 
-  // What Build takes at its peak, its arguments not counted.
+  // Peak memory of Build, beside its arguments. Unit: bytes.
   static uint64_t BuildBytes(uint64_t points, uint64_t simplices) {
     return points * (sizeof(FaceMask) + sizeof(double) + sizeof(SimplexId) + sizeof(uint32_t)) +
            simplices * (sizeof(Item) + 3 * sizeof(uint32_t));
@@ -135,7 +135,7 @@ class Triangulation {
   // Errors:     none.
   SimplexId Locate(const Point<D>& p, VertexId start) const;
 
-  // What a vertex at `p`, a point of the box, would replace; `from` is a simplex in conflict with it.
+  // The cavity of a vertex at `p`, a point of the box; `from` is a simplex in conflict with it.
   //
   // Complexity: O(result).
   // Errors:     none.
@@ -143,7 +143,7 @@ class Triangulation {
   void FindCavity(SimplexId from, const Point<D>& p, Cavity& out) {
     FindCavityUnless(from, p, out, [](const Cavity::Facet&) { return false; });
   }
-  // The same, but ends where `is_refused`(Cavity::Facet) of a facet of the boundary. Returns whether there is no such
+  // FindCavity, but ends where `is_refused`(Cavity::Facet) of a facet of the boundary. Returns whether there is no such
   // one.
   template <typename IsRefused>
   bool FindCavityUnless(SimplexId from, const Point<D>& p, Cavity& out, IsRefused is_refused) {
@@ -152,7 +152,7 @@ class Triangulation {
     mark_[Index(from)] = stamp_;
     return Grow(p, 0, box_.FacesOf(p), out, is_refused);
   }
-  // What `v` would replace, its star included, if its weight rose to `weight`.
+  // The cavity of `v`, its star included, if its weight rose to `weight`.
   //
   // REQUIRES:   v is in, and its weight is less.
   void FindCavityOfWeight(VertexId v, double weight, Cavity& out);
@@ -250,10 +250,10 @@ class Triangulation {
   std::vector<uint64_t> open_keys_;  // KeyOf the facet of each
   VertexId removed_ = kNoVertex;
   std::vector<Saved> saved_;        // the star of removed_
-  std::vector<SimplexId> filling_;  // what took its place
+  std::vector<SimplexId> filling_;  // the simplices that took its place
 };
 
-// Adds what is in conflict to the simplices that are there and marked, up to the first refused facet. Simplices that
+// Adds the simplices in conflict to those that are there and marked, up to the first refused facet. Simplices that
 // are not in conflict but touch `p` are none.
 template <int D>
 template <typename IsRefused>

@@ -48,7 +48,7 @@ class LeafBlocks {
 
  private:
   const LeafTree<D>& tree_;
-  std::vector<NodeId> leaves_;  // those with vertices
+  std::vector<NodeId> leaves_;  // the leaves with vertices
   std::vector<size_t> begin_;   // by block, in leaves_; one more
 };
 

@@ -26,7 +26,7 @@ bool HasTooMany(const SegmentLists& lists, NodeId leaf, uint64_t nodes) {
          lists.MemoryBytes() <= lists.count() * kBytesPerSegment + nodes * kBytesPerNode + kBytesAnyway;
 }
 
-// What there is beside the tree while it is built: points, and of a domain its graph and faces.
+// The memory beside the tree while it is built: points, and of a domain its graph and faces.
 template <int D>
 uint64_t BytesBeside(std::span<const Point<D>> points, const SegmentLists& lists) {
   constexpr uint64_t kDomainBytesPerSegment = 80;
@@ -87,7 +87,7 @@ absl::Status LeafTree<D>::Build(const MortonGrid<D>& grid, std::span<const Point
   root.low = grid.root_low();
   root.neighbour.fill(kNoNode);
   if (points.size() > kFilledTogether) {
-    // Most clouds need fewer; of large arrays what is not used takes no memory.
+    // Most clouds need fewer; unused room of large arrays takes no memory.
     nodes_.reserve(points.size() / 8);
     ranges_.reserve(points.size() / 8);
   }
@@ -213,7 +213,7 @@ void LeafTree<D>::Append(NodeId leaf, VertexId v, const Point<D>& p) {
   leaf_of_[Index(v)] = leaf;
 }
 
-// Which child of `node` a point of its cube belongs to; for a point outside, the child that is nearest. A point on the
+// The child of `node` that a point of its cube belongs to; for a point outside, the nearest child. A point on the
 // high face of the box stays on the low side of a cut there, since nothing of the box lies on the other.
 template <int D>
 int LeafTree<D>::ChildHolding(const Node& node, const Point<D>& p) const {
@@ -510,7 +510,7 @@ void LeafTree<D>::ForEachTouching(NodeId leaf, Sides sides, F&& f) const {
       f(around[axes]);
       continue;
     }
-    // Those children touch the leaf that face it along `axes`; of the children of one, those that face it along all
+    // Children that face the leaf along `axes` touch it; of the children of one, the ones that face it along all
     // axes that tell the two apart.
     const uint32_t facing = own ^ axes;
     const uint32_t fixed = kChildren - 1 - (inward & ~axes);
@@ -555,7 +555,7 @@ bool LeafTree<D>::HasNearFeatures(std::span<const Point<D>> points, const Box<D>
   }
   // Two points that are farther from each other are not both within reach of a third.
   const double far_sq = 4 * (1 + 0x1p-20) * reach_sq;
-  // What the columns rely on: it is at most side / 64, and points lie at most side / 128 beyond the cube.
+  // The columns rely on this: it is at most side / 64, and points lie at most side / 128 beyond the cube.
   static_assert(kCoarseness >= 128);
   ColumnsWithPoints columns(cube.high[0] - cube.low[0]);
   for (size_t i = 0; i < points.size(); ++i) {

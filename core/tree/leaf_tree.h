@@ -1,5 +1,5 @@
-// The balanced orthtree (2^D-tree: quadtree, octree, …) whose leaves hold the vertices: where a vertex lies, and what
-// lies around it.
+// The balanced orthtree (2^D-tree: quadtree, octree, …) whose leaves hold the vertices: the leaf of a vertex, and the
+// leaves around it.
 #ifndef WELLSPACE_CORE_TREE_LEAF_TREE_H_
 #define WELLSPACE_CORE_TREE_LEAF_TREE_H_
 
@@ -50,7 +50,7 @@ class LeafTree {
   // In 5-D and 6-D a vertex has hundreds of neighbours and a node 32 or 64 children: fewer, larger leaves serve better.
   static constexpr int kLeafCapacity = D <= 3 ? 48 : D == 4 ? 64 : 16 << D;
   // A leaf may be this many times larger than lfs on it. At least 2, so that the neighbours of a leaf hold all that is
-  // near it. docs/design/tree.md, "Capacity and coarseness by dimension", has what was measured with 128 and 1024.
+  // near it. docs/design/tree.md, "Capacity and coarseness by dimension", has the measurements with 128 and 1024.
   static constexpr double kCoarseness = D <= 4 ? 128 : 1024;
 
   using VertexPool = LeafVertexPool<D, kLeafCapacity>;
@@ -116,9 +116,9 @@ class LeafTree {
   uint64_t leaf_count() const { return leaf_count_; }
   // Nodes are numbered from 0; not every one is a leaf.
   uint32_t node_count() const { return static_cast<uint32_t>(nodes_.size()); }
-  // What a node takes, but for the vertices in it.
+  // The memory of a node, but for the vertices in it.
   static constexpr size_t NodeBytes() { return sizeof(Node); }
-  // What the tree takes in memory.
+  // The memory that the tree takes.
   uint64_t MemoryBytes() const {
     return nodes_.size() * sizeof(Node) + pool_.MemoryBytes() + ranges_.size() * sizeof(Range) +
            leaf_of_.size() * sizeof(NodeId) + around_.size() * sizeof(Around) + segments_.MemoryBytes() +
@@ -136,8 +136,8 @@ class LeafTree {
   const Point<D>& LowOf(NodeId node) const { return At(node).low; }
   int level(NodeId node) const { return At(node).level; }
   double SideOf(NodeId node) const { return SideOf(At(node)); }
-  // What a point of Build that lies in `leaf` is away from the others, and from the faces of the box that it does not
-  // lie on, at least.
+  // A lower bound on the distance of a point of Build in `leaf` from the others, and from faces of the box that it is
+  // not on.
   double SeparationIn(NodeId leaf) const {
     return At(leaf).level == max_level_ ? 0 : SideOf(At(leaf)) / (2 * kCoarseness);
   }
@@ -202,7 +202,7 @@ class LeafTree {
   // None in around_.
   static constexpr uint32_t kNone = ~uint32_t{0};
 
-  // Of a node under construction: its points, and those around it.
+  // A node under construction: its points, and those around it.
   struct Range {
     uint32_t begin = 0;
     uint32_t end = 0;

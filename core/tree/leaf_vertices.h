@@ -17,17 +17,17 @@
 namespace wellspace::core {
 
 // The vertices of leaves, at most `kMost` each, by number. A leaf has room for its vertices rounded up to a multiple of
-// kTogether, and of an eighth of kMost or less; when that is full it moves, and what it leaves serves another.
+// kTogether, and of an eighth of kMost or less; when that is full it moves, and its old room serves another leaf.
 //
 // Thread safety: thread-compatible.
 template <int D, int kMost>
 class LeafVertexPool {
  public:
-  // What a vertex takes.
+  // The memory that a vertex takes.
   static constexpr size_t kPlaceBytes = sizeof(Point<D>) + sizeof(VertexId);
-  // Positions stay aligned to so many.
+  // Positions stay aligned to this number of bytes.
   static constexpr uint32_t kTogether = 4;
-  // So many positions or ids may be read together, the last perhaps of no vertex.
+  // The number of positions or ids that may be read together, the last perhaps of no vertex.
   static constexpr uint32_t kReadTogether = 8;
 
   struct LeafVertices {
@@ -97,11 +97,11 @@ class LeafVertexPool {
   LeafVertices& operator[](uint32_t number) { return leaves_[number]; }
   const LeafVertices& operator[](uint32_t number) const { return leaves_[number]; }
 
-  // What a leaf takes for `count` vertices.
+  // The memory that a leaf takes for `count` vertices.
   static constexpr size_t BytesFor(uint32_t count) {
     return sizeof(LeafVertices) + static_cast<size_t>(ClassOf(count) + 1) * kStep * kPlaceBytes;
   }
-  // What a leaf takes beside its vertices, on average: half a step is free.
+  // The memory that a leaf takes beside its vertices, on average: half a step is free.
   static constexpr size_t OverheadBytes() { return sizeof(LeafVertices) + kStep / 2 * kPlaceBytes; }
   uint64_t MemoryBytes() const { return taken_bytes_ + leaves_.size() * sizeof(LeafVertices); }
 

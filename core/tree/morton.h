@@ -17,8 +17,8 @@ namespace wellspace::core {
 template <int D>
 using GridPoint = std::array<uint64_t, D>;
 
-// A grid of cubes of side `quantum` over a box: so fine that it tells apart all points that the mesher serves, so
-// coarse that what every cube, and every node of a tree over them, has for a corner in the box is a double. Hence
+// A grid of cubes of side `quantum` over a box: so fine that it tells apart all points that the mesher serves. It is so
+// coarse that corners of its cubes, and of nodes of a tree over them, are doubles where they are in the box. Hence
 // comparing a coordinate with a side of a node is exact.
 //
 // Invariants: (1) the root cube [root_low, root_low + root_side]^D contains the box and root_side = quantum * 2^levels;
@@ -27,8 +27,8 @@ using GridPoint = std::array<uint64_t, D>;
 template <int D>
 class MortonGrid {
  public:
-  // The grid under a tree over `count` points. In 3-D the root is up to twice as large as the box asks for, so that on
-  // some level of the tree a cube has about kEvenly of them if they are spread evenly: under the smallest root, leaves
+  // The grid under a tree over `count` points. In 3-D the root is up to twice as large as the box asks for. So a cube
+  // on some level of the tree has about kEvenly of them if they are spread evenly: under the smallest root, leaves
   // would hold up to 8 times fewer vertices for one number of points than for another, and queries would look into more
   // leaves, or at more vertices.
   explicit MortonGrid(const Box<D>& box, size_t count = 0) : box_(box) {
@@ -59,7 +59,7 @@ class MortonGrid {
   int levels() const { return levels_; }
   const Point<D>& root_low() const { return root_low_; }
   double root_side() const { return std::ldexp(quantum(), levels_); }
-  // Of the nodes of a tree, by level.
+  // The sides of the nodes of a tree, by level.
   std::vector<double> Sides() const {
     std::vector<double> sides;
     for (int level = 0; level <= levels_; ++level) {

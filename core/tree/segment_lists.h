@@ -1,4 +1,4 @@
-// Which segments meet the nodes of a quadtree.
+// The segments that meet the nodes of a quadtree.
 #ifndef WELLSPACE_CORE_TREE_SEGMENT_LISTS_H_
 #define WELLSPACE_CORE_TREE_SEGMENT_LISTS_H_
 
@@ -47,7 +47,7 @@ class SegmentLists {
 
   const Ends& segment(uint32_t number) const { return segments_[number]; }
 
-  // Those that meet a leaf, ascending.
+  // The segments that meet a leaf, ascending.
   std::span<const uint32_t> Of(NodeId leaf) const {
     if (Index(leaf) >= lists_.size()) {
       return {};

@@ -1,6 +1,7 @@
 #include "core/tree/surface_index.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -17,16 +18,31 @@ constexpr double kLarge = 0.25;
 // Tests of triangles against cubes, of some 100 ns, between two looks at the context.
 constexpr size_t kTestsBetweenChecks = size_t{1} << 12;
 
+// A triangle is listed about so often at the leaves that a box near it meets.
+constexpr size_t kListedEach = 4;
+
+// The octants that a closed box meets of a cube from `low` on, a bit each; `side` is that of an octant.
+uint32_t OctantsMet(const Box<3>& box, const Point<3>& low, double side) {
+  constexpr std::array<uint32_t, 3> kLowOnes = {0b0101'0101, 0b0011'0011, 0b0000'1111};  // low along each axis
+  uint32_t met = 0xff;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double middle = low[axis] + side;
+    met &= box.low[axis] > middle || box.high[axis] < low[axis] ? ~kLowOnes[axis] : ~0u;
+    met &= box.low[axis] > middle + side || box.high[axis] < middle ? kLowOnes[axis] : ~0u;
+  }
+  return met;
+}
+
 // Nodes and entries are numbered by 32 bits, of which the last is kept for kInner.
 constexpr uint64_t kMostNumbered = uint64_t{0xffff'fff0};
 
 }  // namespace
 
-// Walks along the Z curve: the segment from each middle to the one before lies in the cube that holds both.
-class SurfaceIndex::MiddleWalk {
+// Walks along the Z curve: the segment from each mark to the one before lies in the cube that holds both.
+class SurfaceIndex::MarkWalk {
  public:
   // It starts from beyond the triangles.
-  MiddleWalk(SurfaceIndex& index, const RunContext& context)
+  MarkWalk(SurfaceIndex& index, const RunContext& context)
       : index_(index), context_(context), within_(index.Root()), known_(index.hull_.low) {
     known_[0] -= 1 + std::abs(known_[0]);
   }
@@ -56,15 +72,15 @@ class SurfaceIndex::MiddleWalk {
       steps_ = 0;
       WELLSPACE_RETURN_IF_ERROR(context_.Check());
     }
-    const Point<3> middle = index_.MiddleOf(leaf);
-    index_.FindCrossings(middle, known_, within_, /*first_alone=*/true, crossings_);
+    const Point<3> mark = index_.MarkOf(leaf);
+    index_.FindCrossings(mark, known_, within_, /*first_alone=*/true, crossings_);
     solid_ = crossings_.empty() ? solid_ : index_.solids_->solid_of[crossings_[0].before];
-    known_ = middle;
+    known_ = mark;
     Node& node = index_.nodes_[leaf.node];
     node.solid = solid_;
     for (uint32_t i = node.first; i < node.first + node.count; ++i) {
       const uint32_t t = TriangleOf(index_.listed_[i]);
-      index_.listed_[i] = EntryOf(t, MovedSide(index_.TriangleAt(t), middle));
+      index_.listed_[i] = EntryOf(t, MovedSide(index_.TriangleAt(t), mark));
     }
     return absl::OkStatus();
   }
@@ -80,8 +96,21 @@ class SurfaceIndex::MiddleWalk {
 
 absl::Status SurfaceIndex::Build(const SurfaceComplex& complex, const Solids& solids, const MortonGrid<3>& grid,
                                  const RunContext& context) {
-  complex_ = &complex;
   solids_ = &solids;
+  WELLSPACE_RETURN_IF_ERROR(BuildNodes(complex, grid, context));
+  return MarkWalk(*this, context).Visit(Root());
+}
+
+absl::Status SurfaceIndex::BuildForDistances(const SurfaceComplex& complex, const MortonGrid<3>& grid,
+                                             const RunContext& context) {
+  solids_ = nullptr;
+  return BuildNodes(complex, grid, context);
+}
+
+// Builds the nodes. The side of a triangle that the mark of its leaf is on is not known yet.
+absl::Status SurfaceIndex::BuildNodes(const SurfaceComplex& complex, const MortonGrid<3>& grid,
+                                      const RunContext& context) {
+  complex_ = &complex;
   box_ = grid.box();
   root_low_ = grid.root_low();
   sides_ = grid.Sides();
@@ -132,15 +161,15 @@ absl::Status SurfaceIndex::Build(const SurfaceComplex& complex, const Solids& so
     pending = std::move(next);
     lists = std::move(next_lists);
   }
-  return MiddleWalk(*this, context).Visit(Root());
+  return absl::OkStatus();
 }
 
 uint64_t SurfaceIndex::Bytes(uint64_t triangles) {
   const uint64_t nodes = kNodesAnyway + kNodesPerTriangle * triangles;
   const uint64_t entries = kEntriesAnyway + kEntriesPerTriangle * triangles;
-  // Arrays grow by doubling: lists of two levels and of leaves, which have no more entries together; nodes, and those
-  // of a level that may be split.
-  return 4 * entries * sizeof(Entry) + 2 * (nodes * sizeof(Node) + nodes / 8 * sizeof(Parent)) +
+  // Arrays grow by doubling: lists of two levels and of leaves, which have no more entries together, and a byte for
+  // each of a node; nodes, and those of a level that may be split.
+  return entries * (4 * sizeof(Entry) + 1) + 2 * (nodes * sizeof(Node) + nodes / 8 * sizeof(Parent)) +
          nodes / 2 * sizeof(Pending);
 }
 
@@ -176,12 +205,15 @@ Box<3> SurfaceIndex::BoxOf(const Cube& cube) const {
   return box;
 }
 
-Point<3> SurfaceIndex::MiddleOf(const Cube& cube) const {
-  Point<3> middle = cube.low;
-  for (double& x : middle) {
-    x += 0.5 * sides_[cube.level];
+// The point of a leaf whose solid it knows. It is not the middle, for planes and sides of triangles are where middles
+// are, as those of a cube in the middle of the grid, and exact signs would take long numbers each time.
+Point<3> SurfaceIndex::MarkOf(const Cube& leaf) const {
+  constexpr Point<3> kShares = {0.4830127018922193, 0.5171572875253810, 0.4944271909999159};
+  Point<3> mark = leaf.low;
+  for (int axis = 0; axis < 3; ++axis) {
+    mark[axis] += kShares[axis] * sides_[leaf.level];
   }
-  return middle;
+  return mark;
 }
 
 // Cubes are half open, but for the high faces of the box, as in the vertices' tree.
@@ -200,6 +232,25 @@ SurfaceIndex::Cube SurfaceIndex::LeafHolding(const Point<3>& p, IndexNode from) 
     cube.node = Child(cube.node, child);
   }
   return cube;
+}
+
+IndexNode SurfaceIndex::Holding(const Box<3>& box) const {
+  Cube cube = Root();
+  while (!IsLeaf(cube.node)) {
+    ++cube.level;
+    uint32_t child = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double middle = cube.low[axis] + sides_[cube.level];
+      if (box.low[axis] >= middle) {
+        child |= 1u << axis;
+        cube.low[axis] = middle;
+      } else if (box.high[axis] > middle) {
+        return cube.node;
+      }
+    }
+    cube.node = Child(cube.node, child);
+  }
+  return cube.node;
 }
 
 // `is_fan`: whether it is split for the sake of a small leaf at the corner of a large fan.
@@ -232,24 +283,39 @@ absl::Status SurfaceIndex::Split(const Cube& cube, std::span<const Entry> list, 
   nodes_[cube.node] = {.first = first, .count = kInner};
   nodes_.resize(nodes_.size() + 8);
   parents_.push_back({cube.low, cube.level});
-  size_t tests = 0;
+  std::vector<uint8_t> met;  // by triangle, a bit for each child
+  met.reserve(list.size());
+  for (size_t i = 0; i < list.size(); ++i) {
+    if (i % (kTestsBetweenChecks / 8) == 0) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+    }
+    met.push_back(ChildrenMetBy(TriangleAt(TriangleOf(list[i])), cube));
+  }
   for (uint32_t k = 0; k < 8; ++k) {
-    const Box<3> box = BoxOf(ChildOf(cube, k));
     Node& child = nodes_[first + k];
     child.first = static_cast<uint32_t>(lists.size());
-    for (const Entry entry : list) {
-      if (++tests % kTestsBetweenChecks == 0) {
-        WELLSPACE_RETURN_IF_ERROR(context.Check());
-      }
-      const Triangle triangle = TriangleAt(TriangleOf(entry));
-      const Box<3> own = BoxOfTriangle(triangle);
-      if (!AreApart(own, box) && (own.LongestSide() < kLarge * sides_[cube.level] || !SurelyMisses(triangle, box))) {
-        lists.push_back(entry);
+    for (size_t i = 0; i < list.size(); ++i) {
+      if ((met[i] >> k & 1) != 0) {
+        lists.push_back(list[i]);
       }
     }
     child.count = static_cast<uint32_t>(lists.size()) - child.first;
   }
   return absl::OkStatus();
+}
+
+// The children of a cube that a triangle may meet, a bit each.
+uint8_t SurfaceIndex::ChildrenMetBy(const Triangle& triangle, const Cube& cube) const {
+  const Box<3> own = BoxOfTriangle(triangle);
+  uint32_t met = OctantsMet(own, cube.low, sides_[cube.level + 1]);
+  // Distances need no short lists: a box is looked at before its triangle.
+  const bool is_large = solids_ != nullptr && own.LongestSide() >= kLarge * sides_[cube.level];
+  for (uint32_t k = 0; k < 8 && is_large; ++k) {
+    if ((met >> k & 1) != 0 && SurelyMisses(triangle, BoxOf(ChildOf(cube, k)))) {
+      met &= ~(1u << k);
+    }
+  }
+  return static_cast<uint8_t>(met);
 }
 
 template <typename Misses, typename Visit>
@@ -284,15 +350,20 @@ uint32_t SurfaceIndex::SolidAt(const Point<3>& p, IndexNode from) const {
       PrefetchLine(&complex_->Corner(TriangleOf(entry), k));
     }
   }
-  const Point<3> middle = MiddleOf(leaf);
+  const Point<3> mark = MarkOf(leaf);
+  Box<3> own{p, p};
+  own.Include({mark, mark});
   std::optional<Triangle> first;
   uint32_t solid = node.solid;
   for (const Entry entry : EntriesOf(leaf.node)) {
-    const Sign of_middle = (entry & 1) != 0 ? Sign::kNegative : Sign::kPositive;
+    const Sign of_mark = (entry & 1) != 0 ? Sign::kNegative : Sign::kPositive;
     const Triangle triangle = TriangleAt(TriangleOf(entry));
+    if (AreApart(BoxOfTriangle(triangle), own)) {
+      continue;
+    }
     const Sign side = MovedSide(triangle, p);
-    if (Crosses(triangle, p, side, middle, of_middle) &&
-        (!first.has_value() || IsCrossedBefore(triangle, *first, p, middle))) {
+    if (Crosses(triangle, p, side, mark, of_mark) &&
+        (!first.has_value() || IsCrossedBefore(triangle, *first, p, mark))) {
       first = triangle;
       solid = solids_->solid_of[HalfFacetOf(TriangleOf(entry), side == Sign::kNegative)];
     }
@@ -319,8 +390,28 @@ void SurfaceIndex::FindCrossings(const Point<3>& a, const Point<3>& b, const Cub
   const auto by_triangle = [](const SurfaceCrossing& s, const SurfaceCrossing& t) { return s.triangle < t.triangle; };
   std::sort(crossings.begin(), crossings.end(), by_triangle);
   crossings.erase(std::unique(crossings.begin(), crossings.end()), crossings.end());
+  KeepCrossed(a, b, first_alone, crossings);
+}
+
+void SurfaceIndex::FindCrossingsAmong(const Point<3>& a, const Point<3>& b, std::span<const uint32_t> triangles,
+                                      std::vector<SurfaceCrossing>& crossings) const {
+  crossings.clear();
+  for (const uint32_t t : triangles) {
+    crossings.push_back({t, 0});
+  }
+  KeepCrossed(a, b, /*first_alone=*/false, crossings);
+}
+
+// Keeps of these triangles, ascending, those that are crossed, in the order in which they are.
+void SurfaceIndex::KeepCrossed(const Point<3>& a, const Point<3>& b, bool first_alone,
+                               std::vector<SurfaceCrossing>& crossings) const {
+  Box<3> own{a, a};
+  own.Include({b, b});
   std::erase_if(crossings, [&](SurfaceCrossing& crossing) {
     const Triangle triangle = TriangleAt(crossing.triangle);
+    if (AreApart(BoxOfTriangle(triangle), own)) {
+      return true;
+    }
     const Sign side = MovedSide(triangle, a);
     crossing.before = HalfFacetOf(crossing.triangle, side == Sign::kNegative);
     return !Crosses(triangle, a, side, b, MovedSide(triangle, b));
@@ -336,57 +427,165 @@ void SurfaceIndex::FindCrossings(const Point<3>& a, const Point<3>& b, const Cub
 }
 
 void SurfaceIndex::FindNear(const Box<3>& box, std::vector<uint32_t>& triangles, IndexNode from) const {
+  FindFewNear(box, std::numeric_limits<size_t>::max() / kListedEach, triangles, from);
+}
+
+bool SurfaceIndex::FindFewNear(const Box<3>& box, size_t most, std::vector<uint32_t>& triangles, IndexNode from) const {
   triangles.clear();
-  ForEachLeaf(
-      CubeOf(from), [&](const Box<3>& cube) { return AreApart(cube, box); },
-      [&](const Cube& leaf) {
-        for (const Entry entry : EntriesOf(leaf.node)) {
-          if (!SurelyMisses(TriangleAt(TriangleOf(entry)), box)) {
-            triangles.push_back(TriangleOf(entry));
-          }
-        }
-      });
+  const size_t most_listed = kListedEach * most;
+  const auto list = [&](const Cube& cube, const auto& list_children) {
+    if (IsLeaf(cube.node)) {
+      for (const Entry entry : EntriesOf(cube.node)) {
+        triangles.push_back(TriangleOf(entry));
+      }
+      return;
+    }
+    for (uint32_t met = OctantsMet(box, cube.low, sides_[cube.level + 1]); met != 0; met &= met - 1) {
+      if (triangles.size() <= most_listed) {
+        list_children(ChildOf(cube, std::countr_zero(met)), list_children);
+      }
+    }
+  };
+  if (const Cube cube = CubeOf(from); !AreApart(BoxOf(cube), box)) {
+    list(cube, list);
+  }
+  if (triangles.size() > most_listed) {
+    return false;
+  }
   std::sort(triangles.begin(), triangles.end());
   triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
+  std::erase_if(triangles, [&](uint32_t t) { return SurelyMisses(TriangleAt(t), box); });
+  return triangles.size() <= most;
 }
 
 std::optional<SurfacePoint> SurfaceIndex::Nearest(const Point<3>& p, double within_sq) const {
+  return FindNearest([](uint32_t /*triangle*/) { return true; }, p, within_sq);
+}
+
+std::optional<SurfacePoint> SurfaceIndex::NearestOf(absl::FunctionRef<bool(uint32_t)> counts, const Point<3>& p,
+                                                    double within_sq) const {
+  return FindNearest(counts, p, within_sq);
+}
+
+// What is nearest in the leaf of p, which is found at once, says how far to look.
+template <typename Counts>
+std::optional<SurfacePoint> SurfaceIndex::FindNearest(const Counts& counts, const Point<3>& p, double within_sq) const {
   std::optional<SurfacePoint> nearest;
-  FindNearest(Root(), p, within_sq, nearest);
+  double reach_sq = within_sq;
+  FindNearestIn(LeafHolding(p, 0).node, counts, p, reach_sq, nearest);
+  const double rounding = RoundingAt(p);
+  FindNearestBelow(HoldingAll(p, std::sqrt(reach_sq) + rounding), counts, p, rounding, reach_sq, nearest);
   return nearest;
 }
 
-// `reach_sq`: only what is nearer counts, or as near if its triangle is lower.
-void SurfaceIndex::FindNearest(const Cube& from, const Point<3>& p, double& reach_sq,
-                               std::optional<SurfacePoint>& nearest) const {
+// The smallest node that holds all of the grid that is no farther from `p` than that.
+SurfaceIndex::Cube SurfaceIndex::HoldingAll(const Point<3>& p, double reach) const {
+  return CubeOf(Holding(CubeAround<3>(p, reach)));
+}
+
+// Points of the surface are rounded, and may have become nearer than the cube that they are in, by no more than this.
+double SurfaceIndex::RoundingAt(const Point<3>& p) const {
+  double size = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    size = std::max({size, std::abs(box_.low[axis]), std::abs(box_.high[axis]), std::abs(p[axis])});
+  }
+  return 0x1p-46 * size;
+}
+
+bool SurfaceIndex::IsWithin(const Point<3>& p, double within_sq, uint32_t& near) const {
+  if (DistanceSq<3>(NearestPoint(InOrderAt(near), p), p) <= within_sq) {
+    return true;
+  }
+  const double reach = std::sqrt(within_sq) + RoundingAt(p);
+  const Cube own = LeafHolding(p, 0);
+  if (IsWithinIn(own.node, p, within_sq, reach * reach, near)) {
+    return true;
+  }
+  const Cube from = HoldingAll(p, reach);
+  return from.node != own.node && IsWithin(from, p, within_sq, reach * reach, near);
+}
+
+bool SurfaceIndex::IsWithinIn(IndexNode leaf, const Point<3>& p, double within_sq, double reach_sq,
+                              uint32_t& near) const {
+  const std::span<const Entry> entries = EntriesOf(leaf);
+  return std::any_of(entries.begin(), entries.end(), [&](Entry entry) {
+    const uint32_t t = TriangleOf(entry);
+    const Triangle triangle = InOrderAt(t);
+    const bool is_within = DistanceSq<3>(p, BoxOfTriangle(triangle)) <= reach_sq &&
+                           DistanceSq<3>(NearestPoint(triangle, p), p) <= within_sq;
+    near = is_within ? t : near;
+    return is_within;
+  });
+}
+
+bool SurfaceIndex::IsWithin(const Cube& from, const Point<3>& p, double within_sq, double reach_sq,
+                            uint32_t& near) const {
   if (IsLeaf(from.node)) {
-    for (const Entry entry : EntriesOf(from.node)) {
-      const uint32_t t = TriangleOf(entry);
-      const Point<3> at = NearestPoint(TriangleAt(t), p);
-      const double distance_sq = DistanceSq<3>(at, p);
-      if (distance_sq < reach_sq || (distance_sq == reach_sq && nearest.has_value() && t < nearest->triangle)) {
-        reach_sq = distance_sq;
-        nearest = {.at = at, .triangle = t, .distance_sq = distance_sq};
-      }
+    return IsWithinIn(from.node, p, within_sq, reach_sq, near);
+  }
+  const std::array<double, 8> distances_sq = DistancesSqOfChildren(from, p);
+  for (uint32_t k = 0; k < 8; ++k) {
+    if (distances_sq[k] <= reach_sq && IsWithin(ChildOf(from, k), p, within_sq, reach_sq, near)) {
+      return true;
     }
+  }
+  return false;
+}
+
+// The squared distances of `p` from the children of a cube.
+std::array<double, 8> SurfaceIndex::DistancesSqOfChildren(const Cube& cube, const Point<3>& p) const {
+  const double side = sides_[cube.level + 1];
+  std::array<std::array<double, 2>, 3> along;  // by axis: from the low half and from the high one
+  for (int axis = 0; axis < 3; ++axis) {
+    const double middle = cube.low[axis] + side;
+    along[axis] = {PositivePartSq(std::max(cube.low[axis] - p[axis], p[axis] - middle)),
+                   PositivePartSq(std::max(middle - p[axis], p[axis] - (middle + side)))};
+  }
+  std::array<double, 8> distances_sq;
+  for (uint32_t k = 0; k < 8; ++k) {
+    distances_sq[k] = along[0][k & 1] + along[1][k >> 1 & 1] + along[2][k >> 2];
+  }
+  return distances_sq;
+}
+
+// `reach_sq`: only what is nearer counts, or as near if its triangle is lower.
+template <typename Counts>
+void SurfaceIndex::FindNearestIn(IndexNode leaf, const Counts& counts, const Point<3>& p, double& reach_sq,
+                                 std::optional<SurfacePoint>& nearest) const {
+  for (const Entry entry : EntriesOf(leaf)) {
+    const uint32_t t = TriangleOf(entry);
+    if (!counts(t)) {
+      continue;
+    }
+    const Point<3> at = NearestPoint(InOrderAt(t), p);
+    const double distance_sq = DistanceSq<3>(at, p);
+    if (distance_sq < reach_sq || (distance_sq == reach_sq && nearest.has_value() && t < nearest->triangle)) {
+      reach_sq = distance_sq;
+      nearest = {.at = at, .triangle = t, .distance_sq = distance_sq};
+    }
+  }
+}
+
+// Cubes are looked into that are farther away by `rounding` than what counts.
+template <typename Counts>
+void SurfaceIndex::FindNearestBelow(const Cube& from, const Counts& counts, const Point<3>& p, double rounding,
+                                    double& reach_sq, std::optional<SurfacePoint>& nearest) const {
+  if (IsLeaf(from.node)) {
+    FindNearestIn(from.node, counts, p, reach_sq, nearest);
     return;
   }
+  const std::array<double, 8> distances_sq = DistancesSqOfChildren(from, p);
   std::array<std::pair<double, uint32_t>, 8> children;
   for (uint32_t k = 0; k < 8; ++k) {
-    children[k] = {DistanceSq<3>(p, BoxOf(ChildOf(from, k))), k};
+    children[k] = {distances_sq[k], k};
   }
   std::sort(children.begin(), children.end());
   for (const auto& [distance_sq, k] : children) {
-    // Points of the surface are rounded, and may have become nearer than the cube that they are in.
-    double size = 0;
-    for (int axis = 0; axis < 3; ++axis) {
-      size = std::max({size, std::abs(box_.low[axis]), std::abs(box_.high[axis]), std::abs(p[axis])});
-    }
-    const double reach = std::sqrt(reach_sq) + 0x1p-46 * size;
+    const double reach = std::sqrt(reach_sq) + rounding;
     if (distance_sq > reach * reach) {
       return;
     }
-    FindNearest(ChildOf(from, k), p, reach_sq, nearest);
+    FindNearestBelow(ChildOf(from, k), counts, p, rounding, reach_sq, nearest);
   }
 }
 

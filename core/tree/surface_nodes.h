@@ -1,4 +1,4 @@
-// Which node of a SurfaceIndex each node of the vertices' octree begins its queries at.
+// The node of a SurfaceIndex at which queries of each node of the vertices' octree begin.
 #ifndef WELLSPACE_CORE_TREE_SURFACE_NODES_H_
 #define WELLSPACE_CORE_TREE_SURFACE_NODES_H_
 

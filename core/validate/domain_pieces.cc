@@ -15,9 +15,9 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "core/base/status_macros.h"
+#include "core/geometry/box_tree.h"
 #include "core/geometry/exact_measure.h"
 #include "core/geometry/segment.h"
-#include "core/validate/box_tree.h"
 #include "core/validate/facet_fans.h"
 #include "core/validate/vertex_places.h"
 
@@ -100,7 +100,7 @@ class Follower {
     return absl::OkStatus();
   }
 
-  // What lies on each facet.
+  // The piece that lies on each facet.
   std::vector<Piece> Facets(std::span<const uint32_t> facets) const {
     std::vector<Piece> pieces(facets.size() / 2);
     std::vector<std::vector<int64_t>> rings;
@@ -185,7 +185,7 @@ class Follower {
     return boxes;
   }
 
-  // The facet at `v` that leads on along `course`, which ends at the vertex `last`, or none; of several the one that
+  // The facet at `v` that leads on along `course`, which ends at the vertex `last`, or none; of several the facet that
   // strays least.
   std::optional<Way> WayAlong(uint32_t v, const Course& course, uint32_t last) const {
     std::optional<Way> best;
@@ -293,7 +293,7 @@ class Follower {
   std::vector<uint32_t> place_in_chain_;  // by facet
   std::vector<uint32_t> source_of_;       // by facet
   const std::vector<uint32_t> corners_;   // the ends of facets
-  const BoxTree tree_;                    // of these
+  const BoxTree<2> tree_;                 // of these
   std::vector<Chain> chains_;
   uint32_t steps_ = 0;
 };
@@ -353,7 +353,7 @@ class StretchCutter {
     for (const uint32_t v : corners) {
       boxes.push_back({made_.vertices[v], made_.vertices[v]});
     }
-    const BoxTree tree(std::move(boxes));
+    const BoxTree<2> tree(std::move(boxes));
     std::vector<Piece> cut(made_.pieces.begin(), made_.pieces.begin() + static_cast<std::ptrdiff_t>(facets_));
     std::vector<std::pair<double, uint32_t>> on;
     for (size_t p = facets_; p < made_.pieces.size(); ++p) {
@@ -539,7 +539,7 @@ absl::StatusOr<DomainPieces> CutSegments(std::span<const double> vertices, std::
   for (size_t v = 0; v < vertices.size() / 2; ++v) {
     made.vertices.push_back(PointAt<2>(vertices, v));
   }
-  VertexPlaces places(made.vertices);
+  WELLSPACE_ASSIGN_OR_RETURN(VertexPlaces places, VertexPlaces::Of(made.vertices, context));
   Follower follower(made.vertices, vertices, facets, segments, tolerance, places);
   // Long ones first, so that shorter ones on them find their chains; and sides of the box last, so that facets are
   // known to be of segments that lie on these.

@@ -15,13 +15,13 @@
 
 namespace wellspace::core {
 
-// The segments that bound a domain: those of its file and, in a box, the sides of that.
+// The segments that bound a domain: from its file and, in a box, the sides of that.
 struct BoundingSegments {
   std::vector<Point<2>> points;
   std::vector<std::array<uint32_t, 2>> ends;
   std::vector<uint8_t> is_ring;
   std::vector<uint32_t> groups;  // of each; none but of FaceRule::kUnion
-  uint32_t given = 0;            // so many come from the file; then the sides of the box follow
+  uint32_t given = 0;            // the number from the file; then the sides of the box follow
 
   // "segments[3]" or "a side of the box".
   std::string NameOf(uint32_t segment) const;
@@ -37,7 +37,7 @@ struct DomainPieces {
 // Follows each segment from facet to facet. A stretch without facets is cut where vertices are within `tolerance` of
 // it, and where it crosses another one.
 //
-// Complexity: O((n + m) log (n + m) + m sqrt(n)) for most domains, and what is found.
+// Complexity: O((n + m) log (n + m) + m sqrt(n)) for most domains, and O(1) for each violation.
 // Errors:     FAILED_PRECONDITION, naming facet or segment: a facet along no segment; a stretch that crosses a facet;
 //             stretches whose crossings do not end. CANCELLED, DEADLINE_EXCEEDED.
 absl::StatusOr<DomainPieces> CutSegments(std::span<const double> vertices, std::span<const uint32_t> facets,

@@ -9,6 +9,7 @@
 
 #include "core/base/cancellable_sort.h"
 #include "core/base/status_macros.h"
+#include "core/features/union_find.h"
 #include "core/geometry/exact_measure.h"
 
 namespace wellspace::core {
@@ -42,7 +43,7 @@ class Sweep {
       return std::tie(a.at, a.kind, a.number) < std::tie(b.at, b.kind, b.number);
     };
     WELLSPACE_RETURN_IF_ERROR(CancellableSort(events, is_earlier, context));
-    NewGap();  // the unbounded face
+    gaps_.Add();  // the unbounded face
     out_.face_of.resize(places_.size());
     uint32_t steps = 0;
     for (size_t begin = 0, end = 0; begin < events.size(); begin = end) {
@@ -80,7 +81,7 @@ class Sweep {
       if (one == other) {
         return false;
       }
-      // The one that starts later is compared with the other.
+      // The piece that starts later is compared with the other.
       const bool is_later = sweep->Low(other) < sweep->Low(one);
       const uint32_t line = is_later ? other : one;
       const uint32_t starts = is_later ? one : other;
@@ -103,21 +104,6 @@ class Sweep {
     });
   }
 
-  uint32_t NewGap() {
-    joined_.push_back(static_cast<uint32_t>(joined_.size()));
-    return joined_.back();
-  }
-  uint32_t FaceOf(uint32_t gap) {
-    while (joined_[gap] != gap) {
-      gap = joined_[gap] = joined_[joined_[gap]];
-    }
-    return gap;
-  }
-  void Join(uint32_t gap, uint32_t other) {
-    gap = FaceOf(gap);
-    other = FaceOf(other);
-    joined_[std::max(gap, other)] = std::min(gap, other);
-  }
   uint32_t GapBelow(Met::const_iterator at) const { return at == met_.begin() ? 0 : above_[*std::prev(at)]; }
 
   // Notes it if two pieces that have come to lie beside each other cross.
@@ -162,7 +148,7 @@ class Sweep {
     }
     if (starting.empty()) {
       if (!ending.empty()) {
-        Join(low_gap, high_gap);
+        gaps_.Join(low_gap, high_gap);
         if (next != met_.begin() && next != met_.end()) {
           Compare(std::prev(next), next);
         }
@@ -177,7 +163,7 @@ class Sweep {
     SortUpwards(starting, 0);
     for (const uint32_t piece : starting) {
       below_[piece] = low_gap;
-      low_gap = above_[piece] = piece == starting.back() ? high_gap : NewGap();
+      low_gap = above_[piece] = piece == starting.back() ? high_gap : gaps_.Add();
       at_[piece] = met_.insert(piece);
     }
     const Met::const_iterator first = at_[starting.front()];
@@ -191,9 +177,9 @@ class Sweep {
   }
 
   void NumberFaces() {
-    std::vector<uint32_t> number(joined_.size(), SweptFaces::kOnPiece);
+    std::vector<uint32_t> number(gaps_.size(), SweptFaces::kOnPiece);
     const auto number_of = [&](uint32_t gap) {
-      uint32_t& face = number[FaceOf(gap)];
+      uint32_t& face = number[gaps_.Find(gap)];
       if (face == SweptFaces::kOnPiece) {
         face = out_.face_count++;
       }
@@ -216,7 +202,7 @@ class Sweep {
   std::vector<Met::const_iterator> at_;  // where each piece is in met_
   std::vector<uint32_t> above_;          // gaps, by piece
   std::vector<uint32_t> below_;
-  std::vector<uint32_t> joined_;  // gaps to a lower one of the same face, or to themselves
+  UnionFind gaps_;  // entries of one face are joined
   SweptFaces out_;
 };
 

@@ -20,7 +20,7 @@ struct Piece {
   static constexpr uint32_t kNotGiven = std::numeric_limits<uint32_t>::max();
 
   std::array<uint32_t, 2> ends{};  // the lower one first
-  uint32_t rings = 0;              // so many ring segments lie on it
+  uint32_t rings = 0;              // the number of ring segments on it
   uint32_t source = kNotGiven;     // a segment that it is of
   std::vector<uint32_t> groups{};  // of these rings, some more than once, if BoundingSegments has any
 };

@@ -15,7 +15,7 @@
 
 namespace wellspace::core {
 
-// Which facets meet at each vertex, in the order of their angles.
+// The facets that meet at each vertex, in the order of their angles.
 //
 // Thread safety: thread-compatible; const functions may run at once.
 class FacetFans {

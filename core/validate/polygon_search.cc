@@ -23,7 +23,7 @@ struct Polygon {
   Box<2> box;
 };
 
-// Of rings that follow each other, the largest around the others.
+// The polygon of a seed: rings that follow each other, the largest around the others.
 Polygon PolygonOf(uint32_t number, std::span<const double> points, const Features& features) {
   const FaceSeed& seed = features.seeds[number];
   const auto at = [&](size_t i) { return PointAt<2>(points, features.ends[i]); };
@@ -132,7 +132,7 @@ absl::StatusOr<std::vector<uint32_t>> FindPolygonsAround(std::span<const Point<2
       if (ends[0][1] > ends[1][1]) {
         std::swap(ends[0], ends[1]);
       }
-      // Those of places at heights from its lower end on, below its higher one.
+      // The places at heights from its lower end on, below its higher one.
       auto at = std::lower_bound(near.begin(), near.end(), ends[0][1],
                                  [&](uint32_t i, double height) { return places[i][1] < height; });
       for (; at != near.end() && places[*at][1] < ends[1][1]; ++at) {

@@ -1,4 +1,4 @@
-// Which of many polygons has a place, for the checks of a domain.
+// The search for the polygon around a place, for the checks of a domain.
 #ifndef WELLSPACE_CORE_VALIDATE_POLYGON_SEARCH_H_
 #define WELLSPACE_CORE_VALIDATE_POLYGON_SEARCH_H_
 

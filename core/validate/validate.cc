@@ -32,7 +32,7 @@ absl::Status Violation(const absl::FormatSpec<Args...>& format, const Args&... a
   return absl::FailedPreconditionError(absl::StrFormat(format, args...));
 }
 
-// What every check needs before it may look at a vertex of a simplex.
+// The condition of every check before it may look at a vertex of a simplex.
 absl::Status CheckShape(const MeshView& mesh) {
   if (mesh.dimension < kMinDimension || mesh.dimension > kMaxDimension) {
     return absl::InvalidArgumentError(

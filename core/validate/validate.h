@@ -17,7 +17,7 @@
 
 namespace wellspace::core {
 
-// A mesh as anybody may have written it.
+// A mesh from any source, perhaps wrong.
 struct MeshView {
   int dimension = 0;
   std::span<const double> points;       // vertex_count x dimension, row-major

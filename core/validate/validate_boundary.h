@@ -12,11 +12,11 @@
 
 namespace wellspace::core {
 
-// The boundary of a mesh as anybody may have written it.
+// The boundary of a mesh from any source, perhaps wrong.
 struct BoundaryView {
   std::span<const uint32_t> facets;        // facet_count x dimension indices of vertices, row-major
   std::span<const int32_t> tags;           // facet_count
-  std::map<int32_t, std::string> names{};  // of tags; those that are names of faces, as FaceName has them, are checked
+  std::map<int32_t, std::string> names{};  // of tags; names of faces, as FaceName has them, are checked
 };
 
 // Every facet that belongs to one simplex, and lies on a face of the box, is there once, with a tag that is not 0, and

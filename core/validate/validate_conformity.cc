@@ -129,7 +129,7 @@ absl::StatusOr<Patches> FindPatches(const MeshView& mesh, std::span<const uint32
   return patches;
 }
 
-// Which number of a mesh each marker, or region, has become.
+// The number in a mesh of each marker, or region.
 class Numbers {
  public:
   // `names`: of numbers of the mesh; `prefix`: of the name of a value other than 0, whose name is `of_zero`.
@@ -145,7 +145,7 @@ class Numbers {
                                                        : absl::StrCat(prefix_, value);
   }
 
-  // Whether `number` may be what `value` has become, beside what others have. A value above 0 keeps its number; where
+  // Whether `number` may stand for `value`, beside the pairs taken before. A value above 0 keeps its number; where
   // the mesh has a name of the service, it tells.
   bool Take(int64_t value, int32_t number) {
     if (last_ == std::pair(value, number)) {
@@ -274,7 +274,7 @@ class ConformityCheck {
     return absl::OkStatus();
   }
 
-  // Finds faces, and what lies in them: patches, then seeds, then points that are no vertices.
+  // Finds faces, and which of them hold patches, then seeds, then points that are no vertices.
   absl::Status Sweep() {
     for (const uint32_t t : patches_.largest) {
       const auto corners = CornersOfTriangle(mesh_, t);
@@ -327,7 +327,7 @@ class ConformityCheck {
       }
       faces_[number].patch = i;
     }
-    // Of all that are wrong, the one of the first segment is named.
+    // Of all wrong pieces, the one of the first segment is named.
     const Piece* wrong = nullptr;
     for (size_t p = parts_.boundary.facets.size() / 2; p < made_.pieces.size(); ++p) {
       const Piece& piece = made_.pieces[p];

@@ -13,11 +13,12 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/cancellable_sort.h"
 #include "core/base/status_macros.h"
+#include "core/geometry/box_tree.h"
 #include "core/geometry/exact_measure.h"
 #include "core/geometry/point.h"
 #include "core/geometry/segment.h"
 #include "core/simplex/quality.h"
-#include "core/validate/box_tree.h"
+#include "core/validate/empty_spheres.h"
 #include "core/validate/facet_fans.h"
 
 namespace wellspace::core {
@@ -27,8 +28,6 @@ using Edge = std::pair<uint32_t, uint32_t>;
 
 constexpr size_t kStepsBetweenLooks = 1024;
 constexpr double kRatioTolerance = 1e-9;
-// A circle is looked through that is larger by so much, relatively, than the one that was computed.
-constexpr double kCircleRoom = 1e-9;
 // How far from its circumcentre a triangle is looked around, in circumradii, for the segment that a better vertex would
 // have come too near to. That vertex lies within the circumcircle or a little beyond, and so much nearer to the
 // segment.
@@ -58,10 +57,10 @@ class FacetLines {
 
   // Whether a line that comes within `reach` of `p` meets another one at less than 60 degrees.
   //
-  // Complexity: O(sqrt(facets) + k) for most of what is asked, and O(facets log) for all lines.
+  // Complexity: O(sqrt(facets) + k) for most queries, and O(facets log) for all lines.
   bool HaveSmallAngleNear(const Point<2>& p, double reach) {
     bool have = false;
-    tree_.ForEach(WithinReachOf(p, reach), [&](uint32_t f) {
+    tree_.ForEach(WithinReachOf<2>(p, reach), [&](uint32_t f) {
       have = DistanceToSegment(fans_.At(facets_[size_t{2} * f]), fans_.At(facets_[size_t{2} * f + 1]), p) <= reach &&
              (LeadsToSmallAngle(2 * f) || LeadsToSmallAngle(2 * f + 1));
       return !have;
@@ -125,7 +124,7 @@ class FacetLines {
 
   const std::span<const uint32_t> facets_;
   const FacetFans fans_;
-  const BoxTree tree_;        // of facets
+  const BoxTree<2> tree_;     // of facets
   std::vector<Leads> leads_;  // by the end that a line comes from
 };
 
@@ -191,7 +190,7 @@ absl::StatusOr<std::vector<EdgeUse>> EdgesOf(const MeshView& mesh, std::span<con
   return uses;
 }
 
-// Those of one edge: those of triangles first, by direction, then facets.
+// The entries of one edge: triangles first, by direction, then facets.
 absl::Status CheckEdge(std::span<const EdgeUse> uses) {
   std::array<bool, 2> has_triangle = {false, false};  // by direction
   const EdgeUse* facet = nullptr;
@@ -228,36 +227,6 @@ absl::Status CheckEdges(const MeshView& mesh, std::span<const uint32_t> facets, 
   return context.Check();
 }
 
-absl::Status CheckEmptyCircles(const MeshView& mesh, const RunContext& context) {
-  std::vector<Box<2>> boxes;
-  for (size_t v = 0; v < mesh.points.size() / 2; ++v) {
-    boxes.push_back({PointAt<2>(mesh.points, v), PointAt<2>(mesh.points, v)});
-  }
-  const BoxTree tree(std::move(boxes));
-  for (size_t t = 0; t < mesh.simplices.size() / 3; ++t) {
-    if (t % kStepsBetweenLooks == 0) {
-      WELLSPACE_RETURN_IF_ERROR(context.Check());
-    }
-    const auto corners = CornersOf(mesh, t);
-    const Simplex<2> places = PlacesOf(mesh, corners);
-    const Point<2> offset = ExactCircumcentreOffset<2>(places);
-    const Point<2> centre = {places[0][0] + offset[0], places[0][1] + offset[1]};
-    const double radius = std::sqrt(NormSq<2>(offset));
-    std::optional<uint32_t> inside;
-    tree.ForEach(WithinReachOf(centre, radius * (1 + kCircleRoom)), [&](uint32_t v) {
-      if (std::find(corners.begin(), corners.end(), v) == corners.end() &&
-          InSphere<2>(places, PointAt<2>(mesh.points, v)).sign == Sign::kPositive) {
-        inside = v;
-      }
-      return !inside.has_value();
-    });
-    if (inside.has_value()) {
-      return Violation(absl::StrCat("triangle ", t, ": vertex ", *inside, " lies inside its circumcircle"));
-    }
-  }
-  return absl::OkStatus();
-}
-
 }  // namespace
 
 absl::StatusOr<DomainReport> ValidateDomainMesh(const MeshView& mesh, std::span<const uint32_t> facets, double rho,
@@ -270,7 +239,7 @@ absl::StatusOr<DomainReport> ValidateDomainMesh(const MeshView& mesh, std::span<
   WELLSPACE_RETURN_IF_ERROR(ValidateIndices(mesh));
   WELLSPACE_RETURN_IF_ERROR(ValidateOrientation(mesh));
   WELLSPACE_RETURN_IF_ERROR(CheckEdges(mesh, facets, context));
-  WELLSPACE_RETURN_IF_ERROR(CheckEmptyCircles(mesh, context));
+  WELLSPACE_RETURN_IF_ERROR(CheckEmptySpheres<2>(mesh, "triangle", "circumcircle", context));
   DomainReport report;
   if (rho == 0) {
     return report;

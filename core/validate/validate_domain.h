@@ -28,14 +28,14 @@ struct DomainView {
   double merge_distance = 0;       // of points; 0: equal ones alone, and corners of rings within the tolerance
 };
 
-// What is told of a mesh of a domain beside its triangles.
+// The parts of a mesh of a domain beside its triangles.
 struct DomainParts {
   BoundaryView boundary;                          // `tags` may be none: they are not known
   std::span<const int32_t> regions{};             // of each triangle an id, or none: all are of one
   std::map<int32_t, std::string> region_names{};  // of ids, where they are known
 };
 
-// What a check of a domain found, beside violations.
+// The findings of a check of a domain, beside violations.
 struct DomainReport {
   uint64_t exempt = 0;  // triangles that break rho at a small angle of the input
 };
@@ -57,11 +57,11 @@ absl::StatusOr<DomainReport> ValidateDomainMesh(const MeshView& mesh, std::span<
 // have the region of their face, and are no larger than it allows; facets have the tags of their segments, as the
 // proto's BoundaryPart says. Faces are found here once more, without the mesher's code. Each stretch of a segment is
 // looked at by itself: one may bound a face that is meshed, and the next one nothing. Places are compared up to
-// `tolerance`, which is what a split segment is bent by: of segments that are led through points a distance away, as
+// `tolerance`, by which a split segment is bent: of segments that are led through points a distance away, as
 // much as that. Points that are merged are looked for where they are then.
 //
 // With FaceRule::kBox a box that is not known is taken for that of the mesh and the points, and for one that reaches
-// beyond seeds outside of these: what is not meshed beside its true sides may then be taken for missing. A face that is
+// beyond seeds outside of these: the part outside of its true sides may then be taken for missing. A face that is
 // not meshed is not looked at if there are polygons that are holes: it may be in one.
 //
 // REQUIRES:   ValidateDomainMesh is OK; tolerance > 0.

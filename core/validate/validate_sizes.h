@@ -1,4 +1,4 @@
-// Which bounds on sizes a simplex is held to, and whether it keeps them.
+// The bounds on sizes that a simplex is held to, and whether it keeps them.
 #ifndef WELLSPACE_CORE_VALIDATE_VALIDATE_SIZES_H_
 #define WELLSPACE_CORE_VALIDATE_VALIDATE_SIZES_H_
 

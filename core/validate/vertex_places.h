@@ -9,6 +9,10 @@
 #include <tuple>
 #include <vector>
 
+#include "absl/status/statusor.h"
+#include "core/base/cancellable_sort.h"
+#include "core/base/run_context.h"
+#include "core/base/status_macros.h"
 #include "core/geometry/point.h"
 
 namespace wellspace::core {
@@ -18,10 +22,14 @@ namespace wellspace::core {
 // Thread safety: thread-compatible.
 class VertexPlaces {
  public:
-  explicit VertexPlaces(std::vector<Point<2>>& vertices) : vertices_(vertices), order_(vertices.size()) {
-    std::iota(order_.begin(), order_.end(), 0);
-    std::sort(order_.begin(), order_.end(),
-              [&](uint32_t u, uint32_t v) { return std::tie(vertices_[u], u) < std::tie(vertices_[v], v); });
+  // REQUIRES:   `vertices` outlives it.
+  // Complexity: O(n log n).
+  // Errors:     CANCELLED, DEADLINE_EXCEEDED.
+  static absl::StatusOr<VertexPlaces> Of(std::vector<Point<2>>& vertices, const RunContext& context) {
+    VertexPlaces places(vertices);
+    const auto is_before = [&](uint32_t u, uint32_t v) { return std::tie(vertices[u], u) < std::tie(vertices[v], v); };
+    WELLSPACE_RETURN_IF_ERROR(CancellableSort(places.order_, is_before, context));
+    return places;
   }
 
   // The vertex at `p`, which is made if there is none.
@@ -39,8 +47,12 @@ class VertexPlaces {
   }
 
  private:
+  explicit VertexPlaces(std::vector<Point<2>>& vertices) : vertices_(vertices), order_(vertices.size()) {
+    std::iota(order_.begin(), order_.end(), 0);
+  }
+
   std::vector<Point<2>>& vertices_;
-  std::vector<uint32_t> order_;  // of those that were there at first, by place
+  std::vector<uint32_t> order_;  // of the vertices that were there at first, by place
   std::map<Point<2>, uint32_t> made_;
 };
 

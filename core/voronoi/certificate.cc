@@ -87,8 +87,8 @@ template <int D>
 struct ExactNode {
   IntegerVector<D> numerator;  // y = 2 x = numerator / denominator
   Integer denominator;         // positive
-  // Of the matrix with the normals for rows, times the denominator: columns[k] is what a step along it adds to normal k
-  // . y and to no other's.
+  // The inverse of the matrix with the normals for rows, times the denominator: a step along columns[k] changes normal
+  // k . y, and that of no other normal.
   std::array<IntegerVector<D>, D> columns;
   Point<D> x;  // each coordinate within a relative error of 2^-50
   double reach;
@@ -257,7 +257,7 @@ class Certifier {
   absl::Status CheckNumbers(size_t i) const {
     const CellNode<D>& node = cell_.nodes[i];
     const ExactNode<D>& exact = exact_[i];
-    // What the rounding of the exact node itself allows for.
+    // The error of rounding the exact node itself.
     const double rounding = 16 * kUnit * exact.reach;
     const double off = std::sqrt(DistanceSq<D>(node.x, exact.x));
     if (!(off <= node.slack + rounding)) {

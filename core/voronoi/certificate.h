@@ -1,4 +1,4 @@
-// Proof, after the fact, that a Voronoi cell is what the paper claims of it: no larger and no smaller. For tests, and
+// Proof, after the fact, that a Voronoi cell is as the paper claims: no larger and no smaller. For tests, and
 // for users of the structure alone.
 #ifndef WELLSPACE_CORE_VORONOI_CERTIFICATE_H_
 #define WELLSPACE_CORE_VORONOI_CERTIFICATE_H_
@@ -13,7 +13,7 @@
 
 namespace wellspace::core {
 
-// A cell as anybody may have kept it.
+// A cell from any source, perhaps wrong.
 template <int D>
 struct CellView {
   CellView(const Point<D>& at, std::span<const CellNode<D>> all_nodes, std::span<const Plane<D>> all_planes)
@@ -28,9 +28,9 @@ struct CellView {
 };
 
 // Proves that `cell` is the Voronoi cell of `v` among the vertices of `structure`, in its box, clipped by the cube of
-// half side `radius` about v: what QueryStructure::ClippedVoronoi promises, and a cell that was cut since by vertices
-// added since. Decided in integers, on the planes' sources; coordinates of nodes are only checked against what follows
-// from them. Neither the tree, nor the scan, nor the predicate that cut the cell take part.
+// half side `radius` about v: the promise of QueryStructure::ClippedVoronoi. Vertices that were added since may have
+// cut it, too. Decided in integers, on the planes' sources; coordinates of nodes are only compared with the results.
+// Neither the tree, nor the scan, nor the predicate that cut the cell take part.
 //
 // OK means, with P the exact cell:
 //
@@ -61,8 +61,8 @@ struct CellView {
 template <int D>
 absl::Status CertifyCell(const QueryStructure<D>& structure, VertexId v, double radius, const CellView<D>& cell);
 
-// The same of the whole cell, inside walls one longest side of the box beyond it: what QueryStructure::Voronoi promises
-// of one cell. How it breaks ties (which of the simple polytopes that are equal as sets it is) is not looked at.
+// The same of the whole cell, inside walls one longest side of the box beyond it: QueryStructure::Voronoi promises that
+// for one cell. How it breaks ties (which of the simple polytopes that are equal as sets it is) is not looked at.
 template <int D>
 absl::Status CertifyWholeCell(const QueryStructure<D>& structure, VertexId v, const CellView<D>& cell);
 

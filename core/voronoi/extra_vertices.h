@@ -1,4 +1,4 @@
-// Vertices that a cell is to be cut by though its structure does not hold them: those that a batch expects to be
+// Vertices that a cell is to be cut by though its structure does not hold them: vertices that a batch expects to be
 // inserted.
 #ifndef WELLSPACE_CORE_VORONOI_EXTRA_VERTICES_H_
 #define WELLSPACE_CORE_VORONOI_EXTRA_VERTICES_H_
@@ -16,8 +16,8 @@
 
 namespace wellspace::core {
 
-// They are numbered in the order in which they come. Those that come one after the other tend to be near each other: a
-// box around every few tells which may matter.
+// They are numbered in the order in which they come. Vertices that come one after the other tend to be near each other:
+// a box around every few tells which may matter.
 //
 // Thread safety: thread-compatible.
 template <int D>
@@ -53,7 +53,7 @@ class ExtraVertices {
   }
 
   // Calls f(std::span<const Point<D>>, VertexId) for runs of vertices and the first of each, in order: with all that
-  // are no farther from `p`, by the square. No run is longer than what a leaf holds, and all may be read as vertices of
+  // are no farther from `p`, by the square. No run is longer than a leaf's capacity, and all may be read as vertices of
   // one may (VertexPool::kReadTogether).
   //
   // Complexity: O(size / kTogether), and the runs.

@@ -19,7 +19,7 @@ namespace wellspace::core {
 // A leaf is queued in a class with those whose distances round to the same power of two: first come, first served
 // there. As many leaves are opened then as in the order of the distances themselves, and none has to be looked for.
 //
-// Thread safety: thread-compatible. For one scan; made where it is used, so that what it counts with stays in
+// Thread safety: thread-compatible. For one scan; made where it is used, so that its counters stay in
 //                registers.
 class LeafQueue {
  public:
@@ -32,12 +32,12 @@ class LeafQueue {
   // warm.
   using Memory = std::vector<Entry>;
 
-  // For a scan from a leaf of side `scale`: what is far nearer or far farther than that is in one class.
+  // For a scan from a leaf of side `scale`: far nearer distances are one class, and far farther ones.
   WELLSPACE_INLINE LeafQueue(Memory& memory, double scale)
       : memory_(memory), base_(Class(scale * scale) - kNearClasses), last_(kFirstOfClasses) {}
   WELLSPACE_INLINE bool IsEmpty() const { return occupied_ == 0; }
 
-  // Makes room for so many more.
+  // Makes room for `more` leaves.
   WELLSPACE_INLINE void Reserve(size_t more) {
     if (end_ + more > room_) {
       entries_ = Grow(memory_, end_ + more);

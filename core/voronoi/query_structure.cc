@@ -40,7 +40,7 @@ void LookInto(const LeafTree<D>& tree, NodeId leaf, const Point<D>& p, VertexId 
   }
 }
 
-// Of each of different points the squared distance to the nearest other one.
+// The squared distance of each of different points to the nearest other one.
 template <int D, size_t kWidth>
 WELLSPACE_INLINE void NearestAmongWith(std::span<const Point<D>> points, std::span<double> nearest_sq) {
   using Lanes = typename Wide<kWidth>::Lanes;
@@ -199,7 +199,7 @@ void QueryStructure<D>::CutByUncommitted(VertexId v, Polytope<D>& cell) const {
   }
 }
 
-// `near`, or what it was added near to if it is uncommitted.
+// `near`, or, if that is uncommitted, the vertex that it was added near to.
 template <int D>
 VertexId QueryStructure<D>::CommittedNear(VertexId near) const {
   while (near != kNoVertex && Index(near) >= tree_.vertex_count()) {
@@ -288,7 +288,7 @@ WELLSPACE_INLINE void QueryStructure<D>::ScanOutwardWith(const Point<D>& site, N
     open(next.leaf);
     limit_sq = reach_sq();
     queue.Reserve(LeafTree<D>::kMostFaceNeighbours + 1);
-    // A leaf within reach is reached by leaves that are, too: those on the straight line from the site.
+    // A leaf within reach is reached by leaves that are, too: the leaves on the straight line from the site.
     const uint32_t facets = Cube(from, tree_, next.leaf).FacetsWithin(limit_sq);
     tree_.ForEachBeyondFacets(
         next.leaf, facets, [&](NodeId beyond) __attribute__((always_inline)) {
@@ -347,7 +347,7 @@ void QueryStructure<D>::NearestOfEach(NodeId leaf, Workspace<D>& workspace, std:
   for (uint32_t i = 0; i < inside->count; ++i) {
     const Point<D>& p = inside->positions[i];
     Neighbor nearest{kNoVertex, nearest_sq[i]};
-    uint32_t facets = 0;  // those within that distance, and the depth of p below the last of them
+    uint32_t facets = 0;  // facets of the box within that distance, and the depth of p below the last of them
     double depth = 0;
     for (int face = 0; face < 2 * D; ++face) {
       const double below = cube.DistanceToFace(p, face);
@@ -416,6 +416,16 @@ void QueryStructure<D>::UnplacedClippedVoronoi(VertexId v, const Box<D>& clip, W
   Scan(v, workspace, others);
 }
 
+template <int D>
+void QueryStructure<D>::TrialVoronoi(const Point<D>& p, VertexId near, Workspace<D>& workspace) const {
+  std::array<PlaneKind, 2 * D> kinds;
+  kinds.fill(PlaneKind::kFace);
+  workspace.cell.Reset(p, box_, kinds, TieRule::kPerturb);
+  ScanFor(tree_.LeafHolding(CommittedNear(near), p), workspace,
+          [&](NodeId leaf) { CutByLeaf(leaf, kNoVertex, workspace); });
+  CountCuts(workspace);
+}
+
 // Begins the clipped cell of vertex `v` in `box`.
 template <int D>
 void QueryStructure<D>::Clip(VertexId v, const Box<D>& box, const Box<D>& clip, TieRule rule,
@@ -438,7 +448,7 @@ size_t QueryStructure<D>::GatherAround(std::span<const VertexId> sites, Workspac
   return sites.size();
 }
 
-// What `v`, around which vertices may have been gathered, is away from the nearest other one, squared.
+// The squared distance of `v`, around which vertices may have been gathered, from the nearest other one.
 template <int D>
 double QueryStructure<D>::NearestSqOfGathered(VertexId v, Workspace<D>& workspace) const {
   if constexpr (D <= 3) {
@@ -469,7 +479,7 @@ void QueryStructure<D>::ClippedVoronoiByGathered(VertexId v, double radius, TieR
         ++workspace.counters.queries;
       }
       CountCuts(workspace);
-      // With ties that are kept it could depend on the order of the cuts, and thus on what else is asked for.
+      // With ties that are kept it could depend on the order of the cuts, and thus on other queries.
       if (rule == TieRule::kPerturb || cell.counters().exact == 0) {
         cell.Place();
         return;

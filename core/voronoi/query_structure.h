@@ -25,7 +25,7 @@
 
 namespace wellspace::core {
 
-// What queries have cost.
+// The cost of queries.
 struct QueryCounters {
   uint64_t queries = 0;
   uint64_t leaves = 0;    // opened
@@ -59,7 +59,7 @@ struct Neighbor {
   double distance_sq = 0;
 };
 
-// Vertices, the tree over them, and the queries: where a vertex is (points, faces), what is nearest to it, and its
+// Vertices, the tree over them, and the queries: where a vertex is (points, faces), its nearest neighbour, and its
 // cell, clipped or whole. A query writes nothing but its workspace. The functions come in the order of the paper's
 // Figure 3.
 //
@@ -72,7 +72,7 @@ class QueryStructure {
  public:
   static constexpr uint32_t kMostUncommitted = 2048;
 
-  // Has what ClippedVoronoi and ClippedVoronoiOfEach compute end at `box`, which is that of the structure at first.
+  // Has the cells of ClippedVoronoi and ClippedVoronoiOfEach end at `box`, which is that of the structure at first.
   //
   // REQUIRES:   `box` holds all vertices, and lies in the box of the structure; there are segments.
   void SetBoxOfCells(const Box<D>& box) { box_of_cells_ = box; }
@@ -106,15 +106,15 @@ class QueryStructure {
   // Errors:     none.
   Neighbor NearestWithin(VertexId v, double limit_sq, Workspace<D>& workspace) const;
 
-  // Of each vertex of a leaf, in the order of `VerticesIn`, the squared distance to the nearest other one.
+  // The squared distance of each vertex of a leaf, in the order of `VerticesIn`, to the nearest other one.
   //
   // REQUIRES:   `nearest_sq` is as long as the leaf has vertices; no vertex is uncommitted.
   // Complexity: O(1) for each when bottom-up.
   // Errors:     none.
   void NearestOfEach(NodeId leaf, Workspace<D>& workspace, std::span<double> nearest_sq) const;
 
-  // What `v` is away from every other vertex, and from the faces of the box that it does not lie on, at least, as far
-  // as the tree tells: 0 unless v was given to Initialize.
+  // The distance of `v` from every other vertex, and from the faces of the box that it does not lie on, at least, as
+  // far as the tree tells: 0 unless v was given to Initialize.
   //
   // REQUIRES:   no vertex has been added since.
   // Complexity: O(1).
@@ -158,7 +158,7 @@ class QueryStructure {
   // true.
   //
   // In 2-D and 3-D cells take less time than one by one where sites that follow each other are near each other, as in
-  // the order of the Z curve or of leaves: what is around some of them is gathered once (GatheredVertices).
+  // the order of the Z curve or of leaves: the vertices around some of them are gathered once (GatheredVertices).
   //
   // Guarantees: (1) the cells are those of ClippedVoronoi, but for the numbers of their nodes and planes.
   // REQUIRES:   beta > 0; no site is uncommitted; there is another vertex. take() does not change the structure.
@@ -178,12 +178,20 @@ class QueryStructure {
     }
   }
 
-  // The same clipped by a box, which holds v up to rounding, ties perturbed, for callers that may not need the nodes:
+  // ClippedVoronoi by a box, which holds v up to rounding, ties perturbed, for callers that may not need the nodes:
   // they are still to be placed, by cell.Place(). The cell is cut by `others`, too.
   void UnplacedClippedVoronoi(VertexId v, const Box<D>& clip, Workspace<D>& workspace,
                               const ExtraVertices<D>& others = {}) const;
 
-  // Asks the memory for what a query about `v` begins with, which is found in three steps (PrefetchAhead).
+  // Computes in workspace.cell the cell that a vertex at `p` would have in the box, ties perturbed; looked for outward
+  // from `near`. Its nodes are still to be placed.
+  //
+  // REQUIRES:   p in the box and different from all vertices; no vertex is uncommitted.
+  // Complexity: O(1) when bottom-up and near.
+  // Errors:     none.
+  void TrialVoronoi(const Point<D>& p, VertexId near, Workspace<D>& workspace) const;
+
+  // Asks the memory for the data that a query about `v` begins with, which are found in three steps (PrefetchAhead).
   //
   // REQUIRES:   as queries.
   // Complexity: O(1).
@@ -266,7 +274,7 @@ class QueryStructure {
   std::span<const Point<D>> points() const { return {points_.data(), vertex_count_}; }
   FaceMask faces(VertexId v) const { return faces_[Index(v)]; }
   const LeafTree<D>& tree() const { return tree_; }
-  // What the structure takes in memory.
+  // The memory that the structure takes.
   uint64_t MemoryBytes() const {
     return tree_.MemoryBytes() + vertex_count_ * (sizeof(Point<D>) + sizeof(StoredFaces));
   }
@@ -313,7 +321,7 @@ class QueryStructure {
   // By vertex, with room for those that will be uncommitted, so that nothing moves when one is added.
   HugeVector<Point<D>> points_;
   HugeVector<StoredFaces> faces_;
-  std::vector<VertexId> near_;  // of the uncommitted vertices: what they were added near to
+  std::vector<VertexId> near_;  // of the uncommitted vertices: the vertices that they were added near to
 };
 
 }  // namespace wellspace::core

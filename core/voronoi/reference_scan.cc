@@ -103,7 +103,7 @@ Split<D> SplitBySpan(int count, NormalOf normal_of, const Point<D>& normal) {
   return split;
 }
 
-// Which weight is zero first if they move against `along`, or -1; lowers `step` to how far that is.
+// The weight that is zero first if they move against `along`, or -1; lowers `step` to how far that is.
 template <int D>
 int FirstToVanish(std::span<const double> weights, const std::array<double, D>& along, double& step) {
   int leaving = -1;
@@ -160,7 +160,7 @@ double EmptyBallProgram<D>::CertainBound(std::span<const HalfSpace> rows, std::s
   return b > b_error ? (b - b_error) / (Norm<D>(w) + w_error) * (1 - 8 * kUnit) : 0;
 }
 
-// Sets rows_ to what `centres`, the bisectors and `meets` ask for; returns the squared distance of the farthest centre.
+// Sets rows_ to the constraints of `centres`, bisectors and `meets`; returns the farthest centre's squared distance.
 template <int D>
 double EmptyBallProgram<D>::SetRows(const Box<D>& centres, const HalfSpace& meets) const {
   rows_.clear();
@@ -372,7 +372,7 @@ struct Event {
   uint32_t id;
 };
 
-// Of two as near, vertices first, then the lower number.
+// Of two events as near, vertices come first, then the lower number.
 bool IsLater(const Event& a, const Event& b) {
   if (a.diameter != b.diameter) {
     return a.diameter > b.diameter;

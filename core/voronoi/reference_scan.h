@@ -56,10 +56,10 @@ class EmptyBallProgram {
   //
   // Guarantees: (1) as above; (2) no smaller than 1 - 2^-16 times the exact value, or the smallest diameter of balls
   //             that miss q by |x - p|^2 - |x|^2 <= 2^-24 |p| (|p| + 2 |x|), x their centre and p the point of q
-  //             nearest to it; where 4000 pieces do not suffice, which happens in 5 and 6 dimensions, what they prove.
+  //             nearest to it; where 4000 pieces do not suffice, as it happens from 5-D on, the bound that they prove.
   // Complexity: two programs of the kind above a piece; a few pieces up to D = 3, up to thousands in 6 dimensions.
   // Errors:     none.
-  // Source:     [HT08] §6, where this is "a quadratic program rather than a convex one". What is asked of c, sum_i
+  // Source:     [HT08] §6, where this is "a quadratic program rather than a convex one". The conditions on c, sum_i
   //             phi_i(c_i) <= 0 with phi_i(c_i) the least p_i (p_i - 2 c_i) over q, is separable and concave. On a box
   //             of centres chords lie below the phi_i and make the program convex, with an optimum no larger; the box
   //             of the least optimum is split there, where the chords are farthest off, until that optimum keeps the
@@ -99,7 +99,7 @@ class EmptyBallProgram {
   mutable uint64_t solved_ = 0;
 };
 
-// What the reference found, and in which order.
+// The findings of the reference, in their order.
 template <int D>
 struct ReferenceScan {
   struct Visit {
@@ -119,8 +119,8 @@ struct ReferenceScan {
 //
 // The paper clips by the ball of radius t about v and knows no box. Here the centres of balls are confined to the box
 // and the cube, so that d_v^U is finite for just the balls about points x of the clipped cell; the scan ends when no
-// finite distance is queued. Since the cube holds the ball of its half side, what the paper's scan opens up to a
-// clipping distance t <= radius are the visits with diameter < 2 t: a beginning of this scan. (The paper compares
+// finite distance is queued. Since the cube holds the ball of its half side, the leaves that the paper's scan opens up
+// to a clipping distance t <= radius are the visits with diameter < 2 t: a beginning of this scan. (The paper compares
 // diameters with t_max = beta NN(v); for centres up to beta NN(v) away, as its Definition 2 has them, it must be twice
 // that.)
 //

@@ -26,17 +26,17 @@ namespace wellspace::core {
 using StalePair = std::pair<VertexId, VertexId>;
 
 // For each vertex, of the star that it had when it was last looked at, the simplices whose vertices had all been looked
-// at before. As vertices are only added, what is a simplex in the end has been one since the last of its vertices came:
-// so the vertex that was looked at last lists it. What it lists beside is spoiled by a vertex that came later, which is
-// a neighbour in the end, and so has been one since it came: when that is looked at, the list is noted as stale. What
-// is listed depends on the stars and on the order in which they were looked at, and, but for the order within a list,
+// at before. As vertices are only added, a simplex of the end has been one since the last of its vertices came:
+// so the vertex that was looked at last lists it. Its other entries are spoiled by a vertex that came later, which is
+// a neighbour in the end, and so has been one since it came: when that is looked at, the list is noted as stale. The
+// lists depend on the stars and on the order in which they were looked at, and, but for the order within a list,
 // not on how they were computed.
 //
 // Thread safety: thread-compatible; const functions may run at once.
 template <int D>
 class StarLists {
  public:
-  // Lists the simplices of `star` whose vertices have been looked at, in the place of what is listed for `v`; nothing
+  // Lists the simplices of `star` whose vertices have been looked at, in the place of the list of `v`; nothing
   // unless this IsComplete(). `vertex_count`: of all vertices that there are now.
   //
   // REQUIRES:   all simplices of v are in star; v and its neighbours are below vertex_count; vertices are numbered as
@@ -45,7 +45,7 @@ class StarLists {
   // Errors:     none; more than 2^32 simplices cannot be numbered, and are as GiveUp().
   void Set(VertexId v, std::span<const std::array<VertexId, D>> star, uint32_t vertex_count);
 
-  // Makes room for the stars of so many vertices.
+  // Makes room for the stars of `vertices` vertices.
   void Reserve(uint32_t vertices) {
     entries_.reserve(vertices);
     added_.reserve(vertices);
@@ -54,13 +54,13 @@ class StarLists {
 
   // Forgets everything, and lists nothing until Clear(): where vertices move, or go, stars grow.
   void GiveUp();
-  // Whether all that has been looked at is listed.
+  // Whether the stars of all vertices that were looked at are listed.
   bool IsComplete() const { return is_complete_; }
 
   // Forgets everything.
   void Clear() { *this = StarLists(); }
 
-  // What is listed for `v`; nothing if it has not been looked at. Valid until the next Set.
+  // The simplices listed for `v`; none if it has not been looked at. Valid until the next Set.
   std::span<const std::array<VertexId, D>> Of(VertexId v) const {
     if (Index(v) >= entries_.size() || !Has(v)) {
       return {};
@@ -69,7 +69,7 @@ class StarLists {
     return {listed_.data() + entry.begin, entry.count};
   }
 
-  // Asks the memory for what is listed for `v`, which is found in two steps (PrefetchAhead).
+  // Asks the memory for the list of `v`, which is found in two steps (PrefetchAhead).
   void Prefetch(VertexId v, int step) const {
     if (step == 0 && Index(v) < entries_.size()) {
       PrefetchLine(&entries_[Index(v)]);
@@ -129,7 +129,7 @@ class StarLists {
   bool is_complete_ = true;
 };
 
-// Which lists are stale in the end: the neighbours of a vertex that came after it was last looked at. What it lists may
+// The lists that are stale in the end: the neighbours of a vertex that came after it was last looked at. Its list may
 // be spoiled by these, and by no other vertex.
 //
 // Thread safety: thread-compatible; const functions may run at once.

@@ -133,7 +133,7 @@ void Check(const absl::Status& status) {
   if (!status.ok()) throw absl::BadStatusOrAccess(status);
 }
 
-// All that the service has to do with it. value() throws what has failed; the server forgets the session in an hour.
+// All that the service has to do with it. value() throws an error; the server forgets the session in an hour.
 template <int D>
 void SolveAdaptively(const std::string& address, int rounds) {
   client::Client client = client::Connect(address).value();

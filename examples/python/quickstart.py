@@ -24,7 +24,7 @@ def main(out="spot.vtu"):
     print(f"{len(mesh.boundary('zmin'))} triangles on the floor")
     assert (mesh.points[mesh.input_vertices] == points).all()  # to the bit
 
-    mesh.save(out)  # by meshio; .npz needs none
+    mesh.save(out)  # by the tool, or meshio; .npz needs neither
     print(f"wrote {out}")
 
 

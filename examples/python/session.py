@@ -21,7 +21,7 @@ def main():
         mesh = session.download()
         print(f"the coast: {mesh}")
 
-        # Only what is around the new points is refined again; vertices keep their numbers.
+        # Only the mesh around the new points is refined again; vertices keep their numbers.
         session.add([[-0.12, 51.51], [12.48, 41.89]])
         session.refine(size_boxes=[([5, 40], [15, 45], 0.5)])
         finer = session.download()

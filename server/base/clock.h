@@ -1,4 +1,4 @@
-// What time it is: for people, and for the work.
+// The clocks of the server: the wall clock for people, and the time since boot for the work.
 #ifndef WELLSPACE_SERVER_BASE_CLOCK_H_
 #define WELLSPACE_SERVER_BASE_CLOCK_H_
 
@@ -17,9 +17,9 @@ absl::Duration SinceBoot();
 
 // The two clocks of a server.
 struct Clock {
-  // For what is shown alone: it may jump, in either direction.
+  // For times that are only shown: it may jump, in either direction.
   std::function<absl::Time()> wall = absl::Now;
-  // For all that lasts: leases, pacing, what is kept for a while.
+  // For durations: leases, pacing, answers that are kept for a while.
   std::function<absl::Duration()> since_boot = SinceBoot;
 };
 

@@ -1,4 +1,4 @@
-// How many file descriptors this process may have, and what they are for.
+// How many file descriptors this process may have, and their uses.
 #ifndef WELLSPACE_SERVER_BASE_DESCRIPTOR_LIMIT_H_
 #define WELLSPACE_SERVER_BASE_DESCRIPTOR_LIMIT_H_
 
@@ -14,12 +14,12 @@ void RaiseDescriptorLimit();
 uint64_t DescriptorLimit();
 
 // Descriptors of `limit` that no connection takes, so that there are some for files: 24, or a quarter if that is less.
-// A server that keeps sessions in files, whose loss of a descriptor is everybody's, has a quarter, and at least 256, or
-// half if that is less.
+// A server that keeps sessions in files, where every client suffers if a file cannot be opened, has a quarter, and at
+// least 256, or half if that is less.
 uint64_t SpareDescriptors(uint64_t limit, bool keeps_files);
 
-// Files of points that are written at once, of `limit`: half of what no connection takes. What is read, meshes that are
-// written, the log and the readers of metrics share the rest.
+// Files of points that are written at once, of `limit`: half of what no connection takes. Files that are read, meshes
+// that are written, the log and the readers of metrics share the rest.
 uint64_t MaxWrittenFiles(uint64_t limit);
 
 }  // namespace wellspace::server

@@ -13,7 +13,7 @@
 namespace wellspace::server {
 
 // Where std::vector copies all it has when it grows, and holds it twice meanwhile, this asks for the memory to be
-// grown: of a block from M_MMAP_THRESHOLD on (main.cc) the system moves the pages. What is not used takes no memory.
+// grown: of a block from M_MMAP_THRESHOLD on (main.cc) the system moves the pages. Unused pages take no memory.
 //
 // Thread safety: thread-compatible.
 template <typename T>
@@ -44,7 +44,7 @@ class GrowingArray {
     capacity_ = capacity;
   }
 
-  // Appends what is in a range.
+  // Appends the items of a range.
   template <typename Iterator>
   void Append(Iterator first, Iterator last) {
     MakeRoom(size_ + static_cast<size_t>(last - first));
@@ -52,7 +52,7 @@ class GrowingArray {
   }
   void Append(const T& item) { Append(&item, &item + 1); }
 
-  // Makes it `count` long; what is added is `item`.
+  // Makes it `count` long; new items are `item`.
   void Resize(size_t count, const T& item = T()) {
     MakeRoom(count);
     if (count > size_) {

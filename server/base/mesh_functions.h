@@ -1,4 +1,4 @@
-// What meshes: the core, or what a test puts in its place.
+// The functions that mesh: the core's, or a test's in their place.
 #ifndef WELLSPACE_SERVER_BASE_MESH_FUNCTIONS_H_
 #define WELLSPACE_SERVER_BASE_MESH_FUNCTIONS_H_
 
@@ -6,18 +6,18 @@
 #include <memory>
 
 #include "absl/status/statusor.h"
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 
 namespace wellspace::server {
 
-// What meshes: core::MeshPoints, or what a test puts in its place.
+// Makes a mesh: core::MeshPoints, or a test's function in its place.
 using Mesher =
     std::function<absl::StatusOr<core::Mesh>(const core::MeshParameters&, const core::Input&, core::RunContext&)>;
-// What estimates: core::EstimateMesh, or what a test puts in its place.
+// Estimates a mesh: core::EstimateMesh, or a test's function in its place.
 using Estimator = std::function<absl::StatusOr<core::MeshEstimate>(const core::MeshParameters&, const core::Input&,
                                                                    core::RunContext&)>;
 
-// What begins the mesh of a session: core::Mesher::Create, or what a test puts in its place.
+// Begins the mesh of a session: core::Mesher::Create, or a test's function in its place.
 using MesherFactory = std::function<absl::StatusOr<std::unique_ptr<core::Mesher>>(
     const core::MeshParameters&, const core::Input&, core::RunContext&)>;
 

@@ -1,18 +1,18 @@
-// What the service accepts and how much it does at once.
+// The limits of the service: its requests, and the work at once.
 #ifndef WELLSPACE_SERVER_BASE_OPTIONS_H_
 #define WELLSPACE_SERVER_BASE_OPTIONS_H_
 
 #include <cstdint>
 
 #include "absl/time/time.h"
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 
 namespace wellspace::server {
 
 // Most bytes of a serialized request message; what gRPC takes by default.
 inline constexpr int kMaxRequestBytes = 4 * 1024 * 1024;
 
-// What a request takes in memory while it comes: its bytes and the message made of them.
+// The memory that a request takes while it comes: its bytes and the message made of them.
 inline constexpr uint64_t kMessageBytes = 2 * kMaxRequestBytes;
 
 // Most bytes of a serialized response message with a chunk.
@@ -22,7 +22,7 @@ inline constexpr int kMaxResponseBytes = 1024 * 1024;
 // kMaxResponseBytes by itself comes near it.
 inline constexpr int kMaxSentBytes = 4 * 1024 * 1024;
 
-// What the process takes without any work, and room for the allocator: no part of the budget of memory.
+// The memory of the process without any work, and room for the allocator: no part of the budget of memory.
 inline constexpr uint64_t kProcessMemoryBytes = uint64_t{64} << 20;
 
 // Of messages that are coming gRPC may hold half of the limit of memory, and at least this.
@@ -52,10 +52,10 @@ struct ServiceOptions {
   absl::Duration default_ttl = absl::Hours(1);
   absl::Duration max_ttl = absl::Hours(7 * 24);
 
-  // How long a stream waits for a client that does not read.
+  // The time that a stream waits for a client that does not read.
   absl::Duration stall_limit = absl::Minutes(1);
 
-  // How long it waits for the next message of a client that sends.
+  // The time that it waits for the next message of a client that sends.
   absl::Duration upload_stall_limit = absl::Minutes(5);
 };
 

@@ -1,4 +1,4 @@
-// What the machine and its control groups let this process have.
+// The resources that the machine and its control groups let this process have.
 #ifndef WELLSPACE_SERVER_BASE_RESOURCES_H_
 #define WELLSPACE_SERVER_BASE_RESOURCES_H_
 
@@ -14,7 +14,7 @@ struct Resources {
 
 // The machine's memory and processors, or less where a control group of this process, or one above it, has a limit: of
 // memory (memory.max), or of processor time (cpu.max), rounded up to whole processors. Both versions of control groups
-// are read, and processors that this process may not run on do not count. What cannot be read is no limit.
+// are read, and processors that this process may not run on do not count. A file that cannot be read sets no limit.
 //
 // `root` stands before /proc and /sys; tests have files there.
 Resources ReadResources(const std::string& root = "");

@@ -1,4 +1,4 @@
-// What all calls that we serve with a reactor of our own have in common: admission and an end.
+// The common part of all calls that we serve with a reactor of our own: admission and an end.
 #ifndef WELLSPACE_SERVER_CALLS_CALL_H_
 #define WELLSPACE_SERVER_CALLS_CALL_H_
 
@@ -21,11 +21,11 @@ namespace wellspace::server {
 
 // The reactor of one call. `Reactor` is gRPC's, for the kind of call.
 //
-// Lifetime: held by itself until OnDone, and by whatever else may still call it: its job and tasks of the background
-// thread.
+// Lifetime:   held by itself until OnDone, and by whatever else may still call it: its job and tasks of the background
+//             thread.
 // Thread safety: thread-safe: reactions, workers, the background thread and Abort may come at the same time.
 // Invariants: (1) Finish is called once, not while IsWriting(); (2) once ending() is true, no read, write, job or task
-// is started any more; (3) the lock order is this call's mutex, then those of what it uses.
+//             is started any more; (3) the lock order is this call's mutex, then the mutexes of its parts.
 template <typename Reactor>
 class Call : public Reactor, public std::enable_shared_from_this<Call<Reactor>> {
  public:
@@ -44,13 +44,13 @@ class Call : public Reactor, public std::enable_shared_from_this<Call<Reactor>> 
 
   // The following are called with mutex_ held, and want it to be held when they are called.
 
-  // The call is admitted. What it does first.
+  // The call is admitted: its first work.
   virtual void OnBegin() = 0;
   // A write is in flight: Finish has to wait for it. When it is done and ending() is true, FinishNow is to be called.
   virtual bool IsWriting() const { return false; }
-  // The call ends: its work is to be cancelled, and what it still holds can go.
+  // The call ends: its work is to be cancelled, and its resources can go.
   virtual void OnEnd() {}
-  // What the log says of the call besides its end.
+  // The figures of the call in the log, besides its end.
   virtual LogFields Figures() const { return {}; }
 
   // Ends the call with `status`: now, or when the write in flight is done. Only the first call counts. Clients see it

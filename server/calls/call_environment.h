@@ -1,4 +1,4 @@
-// What all calls share.
+// The objects that all calls share.
 #ifndef WELLSPACE_SERVER_CALLS_CALL_ENVIRONMENT_H_
 #define WELLSPACE_SERVER_CALLS_CALL_ENVIRONMENT_H_
 
@@ -19,7 +19,7 @@ namespace wellspace::server {
 class RequestIds;
 class SessionRegistry;
 
-// What all calls share; outlives them.
+// The objects that all calls share; they outlive the calls.
 struct CallEnvironment {
   const ServiceOptions& options;
   const Mesher& mesher;

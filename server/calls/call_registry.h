@@ -12,7 +12,7 @@
 
 namespace wellspace::server {
 
-// Numbers calls, admits them until closed, aborts those that stay.
+// Numbers calls, admits them until closed, aborts the calls that stay.
 //
 // Thread safety: thread-safe. The functions given to Add run without any lock held.
 class CallRegistry {

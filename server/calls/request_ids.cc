@@ -11,7 +11,7 @@
 namespace wellspace::server {
 namespace {
 
-// What an entry takes besides its id and its answer, generously.
+// The memory of an entry besides its id and its answer, generously.
 constexpr size_t kEntryBytes = 256;
 
 // Of the type and the content; equal messages have equal ones, whatever the order of their map fields, and in every
@@ -28,6 +28,13 @@ std::string DigestOf(const google::protobuf::Message& message) {
   SHA256(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size(),
          reinterpret_cast<unsigned char*>(digest.data()));
   return digest;
+}
+
+absl::Status Reused(const std::string& request_id) {
+  return MakeError(v1::ERROR_REASON_REQUEST_ID_REUSED,
+                   absl::StrCat("request_id \"", request_id, "\" was used for another request in the last ",
+                                absl::FormatDuration(RequestIds::kKeptFor), "; give every request an id of its own"),
+                   "request_id");
 }
 
 }  // namespace
@@ -94,16 +101,12 @@ void RequestIds::Once(const std::string& tenant_name, const std::string& request
     if (found == tenant.by_id.end()) {
       Add(tenant, request_id, identified.content).waiting.push_back(std::move(done));
       lock.unlock();
-      work(identified,
-           [this, tenant_name, request_id](const Answer& answer) { Finish(tenant_name, request_id, answer); });
+      work(identified, [this, identified](const Answer& answer) { Finish(identified, answer); });
       return;
     }
     Entry& entry = *found->second;
     if (entry.content != identified.content) {
-      known.status = MakeError(v1::ERROR_REASON_REQUEST_ID_REUSED,
-                               absl::StrCat("request_id \"", request_id, "\" was used for another request in the last ",
-                                            absl::FormatDuration(kKeptFor), "; give every request an id of its own"),
-                               "request_id");
+      known.status = Reused(request_id);
     } else if (entry.is_answered) {
       known = entry.answer;
     } else {
@@ -114,18 +117,33 @@ void RequestIds::Once(const std::string& tenant_name, const std::string& request
   done(known);
 }
 
-void RequestIds::Finish(const std::string& tenant_name, const std::string& request_id, const Answer& answer) {
+std::optional<RequestIds::Answer> RequestIds::AnswerOfAnother(const IdentifiedRequest& request) {
+  auto found = records_.FindAnswer({.tenant = request.tenant, .request_id = request.request_id});
+  if (!found.ok() || !found->has_value()) {
+    return std::nullopt;
+  }
+  return (*found)->content() == request.content ? Answer{absl::OkStatus(), std::move(*(*found)->mutable_response())}
+                                                : Answer{Reused(request.request_id), ""};
+}
+
+void RequestIds::Finish(const IdentifiedRequest& request, const Answer& own_answer) {
+  Answer answer = own_answer.status.ok() ? own_answer : AnswerOfAnother(request).value_or(own_answer);
+  if (IsAnsweredBefore(answer.status)) {
+    answer.status = MakeError(v1::ERROR_REASON_STORE_FAILED,
+                              absl::StrCat("request ", request.request_id,
+                                           " was answered before, and the answer cannot be read now; try again"));
+  }
   std::vector<Done> waiting;
   {
     std::lock_guard lock(mutex_);
-    Tenant& tenant = tenants_[tenant_name];
-    const auto entry = tenant.by_id.at(request_id);
+    Tenant& tenant = tenants_[request.tenant];
+    const auto entry = tenant.by_id.at(request.request_id);
     waiting.swap(entry->waiting);
     entry->is_answered = true;
     if (answer.status.ok()) {
       entry->answer = answer;
       tenant.bytes += answer.response.size();
-      Trim(tenant_name, tenant);
+      Trim(request.tenant, tenant);
     } else {
       Erase(tenant, entry);
     }
@@ -157,7 +175,7 @@ void RequestIds::Trim(const std::string& tenant_name, Tenant& tenant) {
     entry = next;
   }
   if (!forgotten.empty()) {
-    log_.Forget(forgotten);
+    records_.Forget(forgotten);
   }
 }
 

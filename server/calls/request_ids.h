@@ -1,4 +1,4 @@
-// Answers of calls that carried a request_id, for those that repeat them.
+// Answers of calls that carried a request_id, for calls that repeat them.
 #ifndef WELLSPACE_SERVER_CALLS_REQUEST_IDS_H_
 #define WELLSPACE_SERVER_CALLS_REQUEST_IDS_H_
 
@@ -17,7 +17,7 @@
 #include "absl/status/status.h"
 #include "absl/time/time.h"
 #include "google/protobuf/message.h"
-#include "server/store/session_log.h"
+#include "server/store/records.h"
 #include "wellspace/store/v1/records.pb.h"
 
 namespace wellspace::server {
@@ -28,13 +28,17 @@ struct IdentifiedRequest {
   std::string request_id;  // empty: it has none
   std::string content;     // SHA-256 of the request
 
-  // What is to be written down when `response` answers it; nothing without a request_id.
+  // The record to be written down when `response` answers it; nothing without a request_id.
   std::optional<store::v1::AnswerRecord> Answer(const google::protobuf::Message& response) const;
 };
 
-// Has calls that carry the same request_id done once. An answer is kept for kKeptFor; of a tenant with more than
-// kMaxPerTenant of them, or more than kMaxBytesPerTenant in them, the oldest go earlier. Errors are not kept: what
-// failed may be tried again.
+// Has calls that carry the same request_id done once. That is decided where the change is committed: the records refuse
+// a second answer to a request (Records::Apply), and the change with it. Here are the calls of this process that wait
+// for one that is under way, and the answers that it knows. Work that fails has perhaps been done by another process:
+// so the records are asked before the error is given.
+//
+// An answer is kept for kKeptFor; of a tenant with more than kMaxPerTenant of them, or more than kMaxBytesPerTenant in
+// them, the oldest go earlier. Errors are not kept: a failed call may be tried again.
 //
 // Thread safety: thread-safe. Functions that it is given run without any lock held.
 class RequestIds {
@@ -44,18 +48,18 @@ class RequestIds {
   static constexpr size_t kMaxBytesPerTenant = size_t{16} << 20;
   static constexpr size_t kMaxLength = 128;  // of a request_id
 
-  // How a call ended; `response` is what it answered, serialized, if it succeeded.
+  // The end of a call; `response` is its answer, serialized, if it succeeded.
   struct Answer {
     absl::Status status;
     std::string response;
   };
   using Done = std::function<void(const Answer&)>;
 
-  // `log` has the answers, too: it is told which to forget.
+  // `records` have the answers, too: they are told which to forget.
   //
-  // REQUIRES:   `log` outlives this.
-  RequestIds(std::function<absl::Duration()> since_boot, SessionLog& log)
-      : since_boot_(std::move(since_boot)), log_(log) {}
+  // REQUIRES:   `records` outlive this.
+  RequestIds(std::function<absl::Duration()> since_boot, Records& records)
+      : since_boot_(std::move(since_boot)), records_(records) {}
 
   // Takes the answers that were written down before the server was started. They are kept from now on as new ones are.
   // To be called first.
@@ -85,16 +89,18 @@ class RequestIds {
     size_t bytes = 0;  // of answers
   };
 
-  void Finish(const std::string& tenant, const std::string& request_id, const Answer& answer);
+  void Finish(const IdentifiedRequest& request, const Answer& answer);
+  // The answer that any process has given to `request`; none: none has, or it is not known now.
+  std::optional<Answer> AnswerOfAnother(const IdentifiedRequest& request);
 
   // The following want mutex_ to be held.
   Entry& Add(Tenant& tenant, std::string request_id, std::string content);
   void Erase(Tenant& tenant, std::list<Entry>::iterator entry);
-  // Drops what is too old, or too much. Those that are not answered yet stay.
+  // Drops answers that are too old, or too many. Requests that are not answered yet stay.
   void Trim(const std::string& tenant_name, Tenant& tenant);
 
   const std::function<absl::Duration()> since_boot_;
-  SessionLog& log_;
+  Records& records_;
   std::mutex mutex_;
   std::map<std::string, Tenant> tenants_;  // guarded by mutex_
 };

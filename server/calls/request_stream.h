@@ -17,7 +17,7 @@ namespace wellspace::server {
 // it may send is wanted by others.
 //
 // Thread safety: thread-safe, as Call.
-// Invariants: those of Call, and one read is in flight at most.
+// Invariants: as of Call, and one read is in flight at most.
 template <typename Base>
 class RequestStream : public Base {
  public:

@@ -15,12 +15,12 @@
 
 namespace wellspace::server {
 
-// Makes of `Base`, a Call whose reactor writes `Response`s, one that sends what NextResponse gives: each when the one
+// Makes of `Base`, a Call whose reactor writes `Response`s, one that sends NextResponse's: each when the one
 // before is on its way. Nothing is made for a client that does not read; one that takes longer than options.stall_limit
 // over one response is dropped with DEADLINE_EXCEEDED.
 //
 // Thread safety: thread-safe, as Call.
-// Invariants: those of Call, and one write is in flight at most.
+// Invariants: as of Call, and one write is in flight at most.
 template <typename Base, typename Response>
 class ResponseStream : public Base {
  public:
@@ -90,7 +90,7 @@ void ResponseStream<Base, Response>::CheckStall() {
   const std::string message = ToGrpcStatus(status).error_message();
   this->End(std::move(status));
   // Finish would wait behind the write. This sends code and message ahead of it, and ends the write. There are no
-  // details then: clients know the reason by what the message begins with.
+  // details then: clients know the reason by the beginning of the message.
   grpc_call_cancel_with_status(this->context()->c_call(), GRPC_STATUS_DEADLINE_EXCEEDED, message.c_str(), nullptr);
 }
 

@@ -33,7 +33,7 @@ class StallWatch {
   // It is done.
   void End() { is_waiting_ = false; }
 
-  // For `check` to ask, with itself: whether what is waited for takes too long. If not, it will be called again.
+  // For `check` to ask, with itself: whether the awaited event takes too long. If not, it will be called again.
   bool IsStalled(std::function<void()> check) {
     is_scheduled_ = false;
     if (!is_waiting_) {

@@ -14,7 +14,7 @@
 
 namespace wellspace::server {
 
-// Thread safety and invariants: those of Call.
+// Thread safety and invariants: as of Call.
 class UnaryCall final : public Call<grpc::ServerUnaryReactor> {
  public:
   UnaryCall(const CallEnvironment& environment, grpc::CallbackServerContext* context) : Call(environment, context) {}
@@ -50,7 +50,7 @@ class UnaryCall final : public Call<grpc::ServerUnaryReactor> {
     return call.get();
   }
 
-  // The same for a request with a request_id: `handler`, which is given it as its third argument, is asked once,
+  // As above, for a request with a request_id: `handler`, which is given it as its third argument, is asked once,
   // however often the call is repeated.
   template <typename Request, typename Response, typename Handler>
   static grpc::ServerUnaryReactor* ServeOnce(const CallEnvironment& environment, grpc::CallbackServerContext* context,

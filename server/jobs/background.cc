@@ -49,7 +49,7 @@ void Background::RunFirst(std::unique_lock<std::mutex>& lock) {
   tasks_.erase(tasks_.begin());
   lock.unlock();
   task();
-  task = nullptr;  // what it holds is freed without the lock
+  task = nullptr;  // its captures are freed without the lock
   lock.lock();
 }
 

@@ -31,7 +31,7 @@ class Background {
 
   // With RunBy::kCaller, where no time passes but in Pass: runs the first task that is due. False: there is none.
   bool RunDue();
-  // The same: `time` passes, and what is due within it runs.
+  // As if `time` passed: tasks that are due within it run.
   void Pass(absl::Duration time);
 
   // Waits for the task that runs. The others, and those that are posted from now on, do not run any more.

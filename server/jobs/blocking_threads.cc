@@ -79,7 +79,7 @@ void BlockingThreads::RunFirst(std::unique_lock<std::mutex>& lock) {
   ready_.pop_front();
   lock.unlock();
   ready.task();
-  ready.task = nullptr;  // what it holds is freed without the lock
+  ready.task = nullptr;  // its captures are freed without the lock
   lock.lock();
   if (!ready.key.empty()) {
     GoOn(ready.key);

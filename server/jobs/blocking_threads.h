@@ -1,4 +1,4 @@
-// Threads for work that waits for the disk: those of gRPC, and the workers, have other things to do.
+// Threads for work that waits for the disk: gRPC's threads and the workers have other things to do.
 #ifndef WELLSPACE_SERVER_JOBS_BLOCKING_THREADS_H_
 #define WELLSPACE_SERVER_JOBS_BLOCKING_THREADS_H_
 
@@ -43,7 +43,7 @@ class BlockingThreads {
   void RunFirst(std::unique_lock<std::mutex>& lock);
   // Wants mutex_ to be held.
   void MakeReady(Ready ready);
-  // What follows a task of `key`. Wants mutex_ to be held.
+  // Starts the task that follows one of `key`. Wants mutex_ to be held.
   void GoOn(const std::string& key);
 
   const size_t most_threads_;

@@ -36,13 +36,13 @@ class FairQueue {
  public:
   static constexpr int kMaxSkips = 16;
 
-  // Whether a job can start now. It may take what the job needs, where that is there: what it admits is then started.
+  // Whether a job can start now. It may take the memory that the job needs, where that is free: the job then starts.
   using Admit = std::function<bool(const QueuedJob&)>;
 
   bool empty() const { return size_ == 0; }
   size_t size() const { return size_; }
 
-  // Takes `job` to its place: behind those of its tenant that were submitted before it.
+  // Takes `job` to its place: behind the jobs of its tenant that were submitted before it.
   void Add(QueuedJob job);
   // Takes a job out that is not started now. The turns stay as they are.
   //
@@ -56,7 +56,7 @@ class FairQueue {
   // Of the first jobs of each tenant, the first in the order of turns that `admit` admits. It is asked in that order,
   // and no more once it was true.
   std::optional<uint64_t> FindFirst(const Admit& admit) const;
-  // The same of small jobs, whatever they are behind.
+  // As above, of small jobs, whatever they are behind.
   std::optional<uint64_t> FindSmall(const Admit& admit) const;
 
   // A job was started: each tenant's first job, if it waits for memory, was skipped.

@@ -21,16 +21,16 @@ namespace wellspace::server {
 class Job;
 class JobPool;
 
-// What is to be done, and for which tenant.
+// The work of a job, and its tenant.
 struct JobRequest {
   std::string tenant{};
   // Is expected to end within about a second (server/jobs/job_size.h): it need not wait for jobs that are not small.
   bool is_small = false;
   // No other job runs beside it, and none begins before it: should it end the process, it is to take no other with it.
   bool is_alone = false;
-  // The memory of what the work brings along, such as its points; released with the work.
+  // The memory of data that the work brings along, such as its points; released with the work.
   MemoryReservation held{};
-  // What the call has reserved that waits for the job, for longer than the work: bytes.
+  // The bytes that the call which waits for the job has reserved, for longer than the work.
   uint64_t of_call = 0;
   // Has to return soon after the context of its job is cancelled, and must not throw.
   std::function<void(Job&)> work{};
@@ -57,12 +57,12 @@ class Job final : private core::MemoryLender, public std::enable_shared_from_thi
   // needs first: its progress is not the job's.
   absl::Status RunApart(const std::function<absl::Status(core::RunContext&)>& run);
 
-  // Hands in what is reserved for what the run goes on with, such as its mesher: it counts as reserved by the run.
+  // Hands in the memory of objects that the run goes on with, such as its mesher: it counts as reserved by the run.
   //
   // REQUIRES:   the run has reserved nothing yet.
   void GiveMemory(MemoryReservation memory);
 
-  // Hands over `bytes`, or all, of what the run has reserved: for what outlives the job.
+  // Hands over `bytes`, or all, of the memory of the run: for objects that outlive the job.
   MemoryReservation TakeMemory(uint64_t bytes);
 
  private:
@@ -74,20 +74,20 @@ class Job final : private core::MemoryLender, public std::enable_shared_from_thi
 
   // As MemoryLender has them. Errors: CANCELLED; those of MemoryBudget::Reserve, when the bytes are more than all of
   // the budget, more than sessions leave of it, or, for Allow, more than can be had now; and when all jobs wait for
-  // what others of them have.
+  // memory that others of them have.
   absl::Status Reserve(uint64_t bytes) override;
   absl::Status Allow(uint64_t bytes) override;
 
-  // Whether memory is left for what the job waits for, and for a tree, if it is one, `room_for_tree`; it has it then.
+  // Whether it has got the memory that the job waits for: if it is free, and, for a tree, at most `room_for_tree`.
   // Wants the pool's mutex to be held.
   bool TakeWanted(uint64_t room_for_tree);
-  // What is known of its memory. Wants the pool's mutex to be held.
+  // The figures of its memory. Wants the pool's mutex to be held.
   JobMemory GetMemory() const;
-  // What of the run's memory a session keeps, whatever others want.
+  // The bytes of the run's memory that a session keeps, whatever others want.
   uint64_t KeptBytes() const;
   // Has the run have `bytes`, if there is room. Else false, and `*missing` is how many there are none of.
   bool TryToAllow(uint64_t bytes, uint64_t* missing);
-  // Gives back what the run has above `bytes`; false, and nothing is changed, if it has less.
+  // Gives back the run's memory above `bytes`; false, and nothing is changed, if it has less.
   bool ShrinkTo(uint64_t bytes);
   void ReleaseAll();
 

@@ -197,7 +197,7 @@ void JobPool::WaitFor(Job& job, std::unique_lock<std::mutex>& lock) {
     const uint64_t room = job.state_ == Job::State::kRunning ? 0 : RoomFor(job);
     if (room > 0) {
       lock.unlock();
-      (void)memory_.MakeRoom(room, MemoryBudget::Want::kAsMuchAsPossible);  // what is released is dispatched
+      (void)memory_.MakeRoom(room, MemoryBudget::Want::kAsMuchAsPossible);  // released memory is dispatched
       lock.lock();
     }
     is_making_room_ = false;
@@ -262,7 +262,7 @@ JobPool::Starved JobPool::StartStarved(uint64_t room_for_tree) {
   if (running_ + running_small_ > 0) {
     return Starved::kHoldsUp;
   }
-  queue_.ForgetSkips(job.tenant_, job.sequence_);  // what it waits for is no job's: others go on
+  queue_.ForgetSkips(job.tenant_, job.sequence_);  // no job holds the memory that it waits for: others go on
   return Starved::kNone;
 }
 
@@ -284,7 +284,7 @@ uint64_t JobPool::RoomFor(const Job& job) const {
   const uint64_t unreserved = memory_.limit() - memory_.reserved();
   const uint64_t missing = memory.wanted - std::min(memory.wanted, memory.run);
   const uint64_t room_for_tree = memory.run > 0 || job.is_small_ ? kNoBound : GetRoomForTree();
-  if (missing > room_for_tree) {  // what others wait for with their trees has to be free besides
+  if (missing > room_for_tree) {  // the memory that jobs with trees wait for has to be free besides
     return unreserved + (missing - room_for_tree);
   }
   return missing > unreserved ? missing : 0;

@@ -33,22 +33,22 @@ namespace wellspace::server {
 // Small jobs wait for no large ones: where all workers are taken, `small_workers` more run them alone. A small job has
 // a place of its own in the queue, whatever else is in it, and asks for memory without waiting for a starved job.
 //
-// What a run reserves first is its tree. What it asks for then is expected to be all that it needs. Memory that jobs
+// A run reserves its tree first. The bytes that it asks for then are expected to be all that it needs. Memory that jobs
 // need which wait with their trees is given to no other tree (RoomForTree in server/jobs/memory_admission.h). A job
 // that has its tree goes on as soon as the rest fits, first of its tenant or not. If all jobs wait for the trees of
 // one another all the same, one is refused (VictimOfDeadlock).
 //
 // Where idle sessions can give up memory (MemoryBudget::MakeRoom), the thread of a job that waits has them do so.
 //
-// A job that is to run alone (JobRequest::is_alone) waits for the end of those that have begun, and all others for its
-// own.
+// A job that is to run alone (JobRequest::is_alone) waits for the end of all jobs that have begun, and all others for
+// its own.
 //
 // Thread safety: thread-safe. Work runs without any lock of the pool held.
-// Invariants: (1) at most `workers` jobs run and at most `max_queued` more are in the queue; with small workers as many
-// run besides, and as many small jobs are taken besides; of either kind `max_per_tenant` of one tenant; (2) the work of
-// a job runs at most once, and never after Cancel found it in the queue; (3) the work and all that it holds is freed
-// when it returns or is cancelled, not when its Job is; (4) there are at most as many threads as workers of both kinds
-// and one for each job that waits for memory, which are at most `workers` of a tenant.
+// Invariants: (1) at most `workers` jobs run, and `max_queued` more are in the queue; with small workers as many run
+//             besides, and as many small jobs are taken; of either kind `max_per_tenant` of one tenant; (2) the work of
+//             a job runs at most once, and never after Cancel found it in the queue; (3) the work and all that it holds
+//             is freed when it returns or is cancelled, not when its Job is; (4) there are at most as many threads as
+//             workers of both kinds, and one for each job that waits for memory, at most `workers` of a tenant.
 class JobPool {
  public:
   struct Limits {
@@ -77,7 +77,7 @@ class JobPool {
 
   // REQUIRES:   `memory` outlives this.
   JobPool(const Limits& limits, MemoryBudget& memory);
-  // Cancels all jobs and waits for those that run.
+  // Cancels all jobs and waits for the running ones.
   ~JobPool();
   JobPool(const JobPool&) = delete;
   JobPool& operator=(const JobPool&) = delete;
@@ -111,7 +111,7 @@ class JobPool {
   };
   static int& PartOf(Share& share, const Job& job) { return job.is_small_ ? share.small : share.others; }
 
-  // What Job::Reserve does.
+  // The implementation of Job::Reserve.
   absl::Status Reserve(Job& job, uint64_t bytes);
   absl::Status MemoryRefusal(uint64_t bytes) const;
   // Lets the thread of `job`, which cannot have its memory now, wait in the queue for it.
@@ -127,7 +127,7 @@ class JobPool {
   void Dispatch();
   // Starts the job whose turn it is, or refuses one where nothing else helps. False when all have to wait.
   bool StartNext();
-  // What a starved job, if there is one, means for the others: none may start before it, or they go on.
+  // The effect of a starved job, if there is one, on the others: none may start before it, or they go on.
   enum class Starved { kNone, kStarted, kHoldsUp };
   // Starts it, if its memory is there.
   Starved StartStarved(uint64_t room_for_tree);
@@ -140,7 +140,7 @@ class JobPool {
   // Asks the thread of a job that waits to make room: the starved one, or the oldest. Not while another does, and only
   // where idle sessions may have memory. Says whether one does now.
   bool AskForRoom();
-  // How much has to be free, and is not, for `job` to have what it waits for; 0: it is not memory that it waits for.
+  // The bytes that have to become free for `job` to have those that it waits for; 0: it waits for no memory.
   uint64_t RoomFor(const Job& job) const;
   // Whether `queued` needs nothing but a worker; where it waits for memory that is there, it has it then.
   bool Admit(const QueuedJob& queued, uint64_t room_for_tree);
@@ -185,7 +185,7 @@ class JobPool {
   std::map<std::string, Share> jobs_of_;             // by tenant, in the queue or running; none is empty
   std::deque<std::shared_ptr<Job>> started_;         // wait for their thread to wake
   std::map<uint64_t, std::shared_ptr<Job>> begun_;   // have a thread: they run, or wait for memory
-  std::set<uint64_t> alone_;                         // those that run alone, from Submit to kDone
+  std::set<uint64_t> alone_;                         // the jobs that run alone, from Submit to kDone
   int running_ = 0;                                  // have a worker: started_, and begun_ that do not wait
   int running_small_ = 0;                            // have a small worker
   int small_jobs_ = 0;                               // in the queue or running

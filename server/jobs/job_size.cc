@@ -9,7 +9,7 @@
 namespace wellspace::server {
 namespace {
 
-// What a job may be expected to take: less than a second, since others have the cores too.
+// The longest time that a small job may be expected to take: less than a second, since others have the cores too.
 constexpr double kSmallSeconds = 0.25;
 
 // By dimension, of even clouds on a machine of 2023, and a little above: vertices for each point, and the time that

@@ -1,11 +1,11 @@
-// Which jobs are small, as far as can be known before they begin.
+// The sizes of jobs, small or not, as far as can be known before they begin.
 #ifndef WELLSPACE_SERVER_JOBS_JOB_SIZE_H_
 #define WELLSPACE_SERVER_JOBS_JOB_SIZE_H_
 
 #include <cstdint>
 #include <span>
 
-#include "core/mesh_parameters.h"
+#include "core/input/mesh_parameters.h"
 
 namespace wellspace::server {
 
@@ -17,14 +17,14 @@ inline constexpr uint64_t kMostSmallPoints = 40'000;
 //
 // Shapes:     points: n x parameters.dimension, row-major.
 // Guarantees: from above for even clouds; points that come ever closer to each other may take ten times as long.
-// Complexity: O(n), and not much for those that may be small.
+// Complexity: O(n), and not much for jobs that may be small.
 bool IsSmallMesh(const core::MeshParameters& parameters, std::span<const double> points);
 
-// The same of a refinement of a mesh that is there, which may have to be built first, by so many steps.
+// As above, of a refinement of a mesh that is there, which may have to be built first, by `steps` steps.
 bool IsSmallRefinement(const core::MeshParameters& parameters, std::span<const double> points, uint64_t vertices,
                        uint64_t steps);
 
-// The same of an estimate, which needs the tree alone, and of vertices that are added.
+// As above, of an estimate, which needs the tree alone, and of vertices that are added.
 bool IsSmallEstimate(int dimension, uint64_t points);
 bool IsSmallAddition(uint64_t points, uint64_t vertices, uint64_t steps);
 

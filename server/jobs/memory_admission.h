@@ -1,4 +1,4 @@
-// Which jobs may be given memory, decided by nothing but what is known at one moment.
+// The admission of jobs to memory, decided by nothing but the figures of one moment.
 //
 // This is the safety check of the banker's algorithm (E. W. Dijkstra, EWD 623). A state is safe if all jobs that wait
 // could go on one after the other, each with the memory that those before it have freed. RoomForTree says how much a
@@ -15,15 +15,15 @@
 
 namespace wellspace::server {
 
-// What is known of the memory of one job. All sizes are in bytes.
+// The figures of the memory of one job. All sizes are in bytes.
 struct JobMemory {
   uint64_t sequence = 0;    // jobs are numbered in the order of their submission
   bool is_waiting = false;  // it has begun, and waits for memory
   bool has_all = false;     // its run was given more than its tree: it is expected to end with that
-  uint64_t wanted = 0;      // what its run is to have in all; while it waits
-  uint64_t run = 0;         // what its run has: its tree, or all
-  uint64_t freed = 0;       // what will be free once the job has ended
-  uint64_t of_call = 0;     // what its call has reserved, which waits for the job
+  uint64_t wanted = 0;      // bytes that its run is to have in all; while it waits
+  uint64_t run = 0;         // bytes that its run has: its tree, or all
+  uint64_t freed = 0;       // bytes that will be free once the job has ended
+  uint64_t of_call = 0;     // bytes that its call has reserved, which waits for the job
 };
 
 inline constexpr uint64_t kNoBound = std::numeric_limits<uint64_t>::max();
@@ -33,7 +33,7 @@ inline constexpr uint64_t kNoBound = std::numeric_limits<uint64_t>::max();
 bool FitsBesideSessions(uint64_t bytes, uint64_t own_kept, uint64_t kept, uint64_t limit);
 
 // The most that a tree may take, for good, so that those of `begun`, all jobs that have begun, that wait with their
-// trees can go on one after the other, the least need first. `unreserved` is what no reservation has.
+// trees can go on one after the other, the least need first. `unreserved` are the bytes of no reservation.
 //
 // Guarantees: (1) kNoBound if no job waits with its tree; (2) kNoBound, too, if one of them could not go on even when
 //             all jobs that run had ended: a bound would not help it.
@@ -42,7 +42,7 @@ uint64_t RoomForTree(uint64_t unreserved, std::span<const JobMemory> begun);
 
 // If `queued`, all jobs in the queue, and the calls that wait for them, will free whatever work can free, nothing would
 // ever change: then the job to refuse, by its sequence. It is the youngest that waits with memory, or the youngest if
-// none does. Otherwise nothing. `passing` is what is reserved, and not by sessions.
+// none does. Otherwise nothing. `passing` are the bytes reserved, but not by sessions.
 //
 // REQUIRES:   no job runs.
 std::optional<uint64_t> VictimOfDeadlock(uint64_t passing, std::span<const JobMemory> queued);

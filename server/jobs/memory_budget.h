@@ -1,4 +1,4 @@
-// What the jobs, sessions and calls of a server may hold in memory, all together.
+// The memory that the jobs, sessions and calls of a server may hold, all together.
 #ifndef WELLSPACE_SERVER_JOBS_MEMORY_BUDGET_H_
 #define WELLSPACE_SERVER_JOBS_MEMORY_BUDGET_H_
 
@@ -15,7 +15,7 @@ namespace wellspace::server {
 
 class MemoryReservation;
 
-// How long memory is reserved.
+// The time that memory is reserved for.
 enum class Lasts {
   kWork,         // until work ends
   kSession,      // as long as a session wants it
@@ -30,7 +30,7 @@ enum class Lasts {
 //             its budget.
 class MemoryBudget {
  public:
-  // Of `max_memory_bytes` for the whole process, kProcessMemoryBytes are set aside for what is no work. 0: no limit.
+  // Of `max_memory_bytes` for the whole process, kProcessMemoryBytes are set aside for the process itself. 0: no limit.
   explicit MemoryBudget(uint64_t max_memory_bytes);
   MemoryBudget(const MemoryBudget&) = delete;
   MemoryBudget& operator=(const MemoryBudget&) = delete;
@@ -39,11 +39,11 @@ class MemoryBudget {
   // Most that all reservations can have together; without a limit, the largest number.
   uint64_t limit() const { return limit_; }
   uint64_t reserved() const;
-  // Of that, what sessions keep: it is not freed by itself when work ends.
+  // Of that, the bytes that sessions keep: they are not freed when work ends.
   uint64_t lasting() const;
-  // Of what lasts, what sessions keep until it is wanted (Lasts::kUntilWanted).
+  // Of lasting memory, the bytes that sessions keep until they are wanted (Lasts::kUntilWanted).
   uint64_t yielding() const;
-  // Of what is reserved, what does not last.
+  // The reserved bytes that do not last.
   uint64_t passing() const;
 
   // Sets `bytes` aside for `what`, which the error names: "a call", "the points of a session", …
@@ -62,7 +62,7 @@ class MemoryBudget {
   // time; null for none. Returns when no call of the last one is under way.
   void SetReleaseListener(std::function<void()> listener);
 
-  // What MakeRoom does if idle sessions do not hold enough.
+  // The memory that idle sessions give up to MakeRoom if they do not hold enough: none, or all of it.
   enum class Want { kAllOrNothing, kAsMuchAsPossible };
   // Has idle sessions give up memory, `missing` bytes if they can. Says whether idle sessions hold still more.
   using GiveUp = std::function<bool(uint64_t missing, Want want)>;
@@ -74,7 +74,7 @@ class MemoryBudget {
   void NoteIdle();
   // Whether there may be an idle session with memory that MakeRoom would find.
   bool CanMakeRoom() const { return can_make_room_; }
-  // Has idle sessions give up memory until `bytes` are not reserved. Says whether so many are free now.
+  // Has idle sessions give up memory until `bytes` are not reserved. Says whether they are free now.
   //
   // REQUIRES:   the caller holds no lock of a session or of the pool, and may wait: large structures are freed.
   // Complexity: that of the sessions that there are; constant where CanMakeRoom() is false.
@@ -86,7 +86,7 @@ class MemoryBudget {
   // Whether there was room.
   bool Take(uint64_t bytes, Lasts lasts);
   void Release(uint64_t bytes, Lasts lasts);
-  // What was reserved for work lasts as `lasts` says from now on.
+  // Bytes that were reserved for work last as `lasts` says from now on.
   void MakeLasting(uint64_t bytes, Lasts lasts);
   // Counts `bytes` more, or, if `sign` is -1, less. Wants mutex_ to be held.
   void Count(uint64_t bytes, Lasts lasts, int sign);
@@ -107,7 +107,7 @@ class MemoryBudget {
   std::atomic<bool> can_make_room_{false};  // a session has become idle since MakeRoom has found none
 };
 
-// Bytes of a budget, given back at the end of its life. Movable; what was moved from has none.
+// Bytes of a budget, given back at the end of its life. Movable; one that was moved from has none.
 //
 // Thread safety: thread-compatible.
 class MemoryReservation {
@@ -118,9 +118,9 @@ class MemoryReservation {
   MemoryReservation& operator=(MemoryReservation&& other) noexcept;
 
   uint64_t bytes() const { return bytes_; }
-  // Of these, what no session keeps.
+  // Of these, the bytes that no session keeps.
   uint64_t passing_bytes() const { return lasts_ == Lasts::kWork ? bytes_ : 0; }
-  // Of these, what a session keeps whatever others want.
+  // Of these, the bytes that a session keeps whatever others want.
   uint64_t kept_bytes() const { return lasts_ == Lasts::kSession ? bytes_ : 0; }
 
   // Makes it `bytes` large. Growing fails, and changes nothing, where there is no room; shrinking never fails.

@@ -1,4 +1,4 @@
-// Who runs what is given to Background, BlockingThreads and JobPool.
+// The threads that run the tasks given to Background, BlockingThreads and JobPool.
 #ifndef WELLSPACE_SERVER_JOBS_RUN_BY_H_
 #define WELLSPACE_SERVER_JOBS_RUN_BY_H_
 

@@ -53,7 +53,7 @@ spdlog::level::level_enum LevelOf(gpr_log_severity severity) {
   }
 }
 
-// What stands in `text` between `begin` and the next `end`; empty if it is not there.
+// The part of `text` between `begin` and the next `end`; empty if there is none.
 std::string_view Between(std::string_view text, std::string_view begin, char end) {
   const size_t found = text.find(begin);
   if (found == std::string_view::npos) {

@@ -1,4 +1,4 @@
-// What gRPC logs, as lines of our log.
+// The messages of gRPC's own log, as lines of our log.
 #ifndef WELLSPACE_SERVER_LOG_GRPC_LOG_H_
 #define WELLSPACE_SERVER_LOG_GRPC_LOG_H_
 

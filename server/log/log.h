@@ -1,4 +1,4 @@
-// The log of wellspaced: what it writes, and how.
+// The log of wellspaced: its lines, in text or JSON, and its logger.
 #ifndef WELLSPACE_SERVER_LOG_LOG_H_
 #define WELLSPACE_SERVER_LOG_LOG_H_
 

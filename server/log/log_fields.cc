@@ -46,8 +46,8 @@ bool IsNumber(std::string_view text) {
   return text.empty();
 }
 
-// The length of the JSON string at the start of `text`, quotes included; 0 if there is none. What is between the quotes
-// is JsonString's.
+// The length of the JSON string at the start of `text`, quotes included; 0 if there is none. JsonString has made the
+// characters between the quotes.
 size_t JsonStringLength(std::string_view text) {
   if (!text.starts_with('"')) {
     return 0;

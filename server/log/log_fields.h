@@ -10,7 +10,7 @@
 
 namespace wellspace::server {
 
-// `text`, or what of it makes `most` bytes with "…" behind it; characters of UTF-8 stay whole. REQUIRES: most >= 3.
+// `text`, or its beginning of `most` bytes with "…" behind it; characters of UTF-8 stay whole. REQUIRES: most >= 3.
 std::string CutText(std::string_view text, size_t most);
 
 // `text` as a JSON string, with its quotes. Bytes that are no UTF-8 become U+FFFD.
@@ -18,7 +18,7 @@ std::string JsonString(std::string_view text);
 
 // A line `key=value key=value …`. A value that is empty, has blanks, quotes, control characters or bytes above ASCII,
 // or that would pass for a number, stands as a JSON string; so no value can end the line or forge a field. Of a value
-// of more than kMaxValueBytes the rest is lost, and it ends with "…": what a stranger sends may be long.
+// of more than kMaxValueBytes the rest is lost, and it ends with "…": values from clients may be long.
 //
 // Thread safety: thread-compatible.
 class LogFields {

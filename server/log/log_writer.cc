@@ -16,7 +16,7 @@
 namespace wellspace::server {
 namespace {
 
-// How often a thread that waits for a reader looks whether it is still wanted.
+// The interval at which a thread that waits for a reader looks whether it is still wanted.
 constexpr int kWantedLookMs = 100;
 
 }  // namespace

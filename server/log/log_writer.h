@@ -20,7 +20,7 @@ class LogWriter {
  public:
   // Of the lines that wait. A line of a call has some 300 bytes.
   static constexpr size_t kMaxBytes = size_t{4} << 20;
-  // What the destructor gives the lines that wait.
+  // The time that the destructor leaves for the lines that wait.
   static constexpr absl::Duration kFarewell = absl::Seconds(1);
 
   // REQUIRES:   `descriptor` stays open as long as the process lives.

@@ -53,7 +53,7 @@ std::string PeerText(const std::string& key) {
   return absl::StrCat("ipv6:[", inet_ntop(AF_INET6, &address, text, sizeof(text)), "]:", port);
 }
 
-// Who shares an allowance: an IPv4 address, or the network of 64 bits that one customer has with IPv6.
+// The peers that share an allowance: an IPv4 address, or the network of 64 bits that one customer has with IPv6.
 std::string HostOf(const std::string& key) {
   if (key.size() < kAddressBytes) {
     return key;
@@ -70,7 +70,7 @@ void ResetWhenClosed(int socket) {
   setsockopt(socket, SOL_SOCKET, SO_LINGER, &reset, sizeof(reset));
 }
 
-// Throws away what has come on a shut socket and was not read.
+// Throws away bytes that came on a shut socket and were not read.
 void Discard(int socket) {
   constexpr size_t kPiece = size_t{1} << 20;
   constexpr int kMostPieces = 1000;
@@ -86,7 +86,7 @@ void Discard(int socket) {
   }
 }
 
-// What TCP knows of a socket; all 0 where it is none of TCP.
+// The state of a socket as TCP knows it; all 0 where it is none of TCP.
 tcp_info TcpInfoOf(int socket) {
   tcp_info info = {};
   socklen_t size = sizeof(info);
@@ -96,7 +96,7 @@ tcp_info TcpInfoOf(int socket) {
   return info;
 }
 
-// What the peer has not taken yet, and what it has, in bytes.
+// The bytes that the peer has not taken yet, and those that it has.
 struct Output {
   uint64_t waiting = 0;
   uint64_t taken = 0;
@@ -110,17 +110,17 @@ Output OutputOf(int socket) {
   return {.waiting = static_cast<uint64_t>(waiting), .taken = TcpInfoOf(socket).tcpi_bytes_acked};
 }
 
-// What comes with what is sent: updates of windows, which other stacks send for every frame, and pings.
+// The bytes that come in answer to those sent: updates of windows, which other stacks send for every frame, and pings.
 constexpr uint64_t kSentBytesPerClaimed = 16;
-// What comes with time: pings of both sides, and their answers. So little that whoever holds back the end of headers
-// fills no memory.
+// The bytes that come with time: pings of both sides, and their answers. So little that a peer which holds back the end
+// of headers fills no memory.
 constexpr int64_t kClaimedPerSecond = 64;
-// What each connection begins with: a handshake with certificates, settings.
+// The first bytes of each connection: a handshake with certificates, settings.
 constexpr int64_t kOfABeginning = 8 << 10;
 
 }  // namespace
 
-// All but what is const is guarded by mutex_ of Connections.
+// All members but the const ones are guarded by mutex_ of Connections.
 class Connections::Connection {
  public:
   Connection(uint64_t id_in, std::string key_in, FileDescriptor socket_in)
@@ -150,9 +150,9 @@ class Connections::Connection {
   uint64_t received = 0;
   uint64_t acknowledged = 0;
   int64_t unclaimed = 0;
-  int64_t excess = 0;  // of these, what no call can have under way
+  int64_t excess = 0;  // of these, those that no call can have under way
   int64_t excess_before = 0;
-  // What may have been under way of calls that ended, until a while after the last of these ends.
+  // The bytes that may have been under way of calls that ended, until a while after the last of these ends.
   Clock::time_point last_end = Clock::now();
   int64_t of_ended = 0;
 };
@@ -181,7 +181,7 @@ bool Connections::Add(int socket, const sockaddr_storage& peer) {
   }
   std::lock_guard lock(mutex_);
   const uint64_t id = next_id_++;
-  // Only hang-ups are of interest, and these always come: gRPC shuts down what it closes.
+  // Only hang-ups are of interest, and these always come: gRPC shuts down the sockets that it closes.
   epoll_event event = {.events = EPOLLET, .data = {.u64 = id}};
   if (epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, duplicate.get(), &event) != 0) {
     return false;
@@ -271,7 +271,7 @@ int64_t Connections::LastingExcessOf(const Connection& connection) {
 }
 
 void Connections::CountUnclaimed(Connection& connection, Clock::time_point now) const {
-  // In this order: what is claimed by now has come by now.
+  // In this order: bytes claimed by now have come by now.
   const auto claimed = static_cast<int64_t>(connection.claimed.exchange(0));
   const tcp_info info = TcpInfoOf(connection.socket.get());
   const uint64_t received = info.tcpi_bytes_received - std::exchange(connection.received, info.tcpi_bytes_received);

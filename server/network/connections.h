@@ -1,4 +1,4 @@
-// The connections of a server, and what their peers do with them.
+// The connections of a server, and limits on the behaviour of their peers.
 #ifndef WELLSPACE_SERVER_NETWORK_CONNECTIONS_H_
 #define WELLSPACE_SERVER_NETWORK_CONNECTIONS_H_
 
@@ -19,23 +19,23 @@ struct sockaddr_storage;
 
 namespace wellspace::server {
 
-// What a connection may take. Its calls are those that gRPC has handed to us and that have not ended. Those that a peer
-// has reset are among them, while gRPC 1.51 no longer counts them, and takes more.
+// The limits of a connection. Its calls are the ones that gRPC has handed to us and that have not ended. Those that a
+// peer has reset are among them, while gRPC 1.51 no longer counts them, and takes more.
 struct ConnectionLimits {
   int max_streams = 1000;  // calls at once of a connection, as the peer is told; at least 1
   int max_calls = 10'000;  // of all connections together; at least 1
-  // Of messages that are under way on a connection, in bytes: what gRPC holds of all of them at most.
+  // Of messages that are under way on a connection, in bytes: the most that gRPC holds of all of them.
   uint64_t max_received = uint64_t{512} << 20;
-  // How long a peer may read nothing. Longer than any stream waits for its client, unless --stall-limit is raised.
+  // Time that a peer may read nothing. Longer than any stream waits for its client, unless --stall-limit is raised.
   std::chrono::seconds max_unread{120};
 };
 
-// Shuts connections whose peers begin calls only to give them up ("rapid reset", CVE-2023-44487), those that send what
-// belongs to no call, and those that do not read what they are sent.
+// Shuts connections whose peers begin calls only to give them up ("rapid reset", CVE-2023-44487). It also shuts
+// connections whose peers send bytes that belong to no call, or do not read what they are sent.
 //
 // Bytes that came and that no call claims are those of frames that cost their sender nothing: WINDOW_UPDATE, SETTINGS,
 // PRIORITY, PING, empty DATA, CONTINUATION, unknown types. gRPC reads them without end. Calls claim their headers and
-// the messages that they were handed; what the peer is sent, and time, claim a little, for its windows and pings.
+// the messages that they were handed; bytes sent to the peer, and time, claim a little, for its windows and pings.
 //
 // A call is wasted if it ends within a second, and its client has cancelled it or has not sent any message. A
 // connection is shut
@@ -51,11 +51,11 @@ struct ConnectionLimits {
 //   - when the peer has read nothing for `max_unread` although something waits for it.
 // A message that has not come whole is claimed by none yet. So a caller whom the server knows may have kUnderWayOfACall
 // under way for each call that it has, or had lately, and for one that is about to begin; and before calls begin, twice
-// what came of messages before, up to kMostClaimedByEnds, to which the windows of HTTP/2 may have grown. All of it is
+// the bytes of messages before, up to kMostClaimedByEnds, to which the windows of HTTP/2 may have grown. All of it is
 // at most `max_received`.
 //
-// What the peer has sent to a connection that is shut, and gRPC has not read, is thrown away. What gRPC has read it
-// works off: as long as there are more than kMostOrphans such calls, no connection should be accepted.
+// Bytes that the peer has sent to a connection that is shut, and gRPC has not read, are thrown away. Calls that it has
+// read are worked off: as long as there are more than kMostOrphans of them, no connection should be accepted.
 //
 // Each connection costs a second file descriptor.
 //
@@ -81,7 +81,7 @@ class Connections {
   static constexpr int64_t kMostUnclaimedOfAll = int64_t{5} << 20;
   static constexpr int64_t kUnderWayOfACall = int64_t{8} << 20;  // a message, and a window
   static constexpr int64_t kFirstWindow = int64_t{64} << 10;     // with which a connection and a call begin
-  // What was under way of a call that ended before its request did is claimed at its end, and lately after it: of
+  // The bytes under way of a call that ended before its request did are claimed at its end, and lately after it: of
   // strangers no more than kMostClaimedByEndsOfStrangers.
   static constexpr int64_t kMostClaimedByEnds = int64_t{64} << 20;
   static constexpr int64_t kMostClaimedByEndsOfStrangers = int64_t{1} << 20;
@@ -103,19 +103,19 @@ class Connections {
   int descriptor() const { return epoll_.get(); }
   // Forgets connections that are closed.
   void Sweep();
-  // Shuts those whose peers do not read. To be called every few seconds.
+  // Shuts connections whose peers do not read. To be called every few seconds.
   void ShutUnread();
-  // Shuts those that send what no call claims. To be called as often as LookInterval says.
+  // Shuts connections on which bytes come that no call claims. To be called as often as LookInterval says.
   void ShutUnclaimed();
   // So often that little comes meanwhile, and that looking takes little of a thread's time.
   std::chrono::milliseconds LookInterval() const;
 
   // A call has begun on the connection from `peer`, as gRPC writes it: "ipv4:127.0.0.1:1234". Null when there is no
-  // such connection. `is_known`: the server knows who calls.
+  // such connection. `is_known`: the server knows the caller.
   std::shared_ptr<Connection> CallBegan(std::string_view peer, bool is_known);
   // The call accounts for `bytes` that came.
   static void Claim(Connection& connection, uint64_t bytes);
-  // The same for a message of a caller whom the server knows.
+  // As above, for a message of a caller whom the server knows.
   static void ClaimMessage(Connection& connection, uint64_t bytes);
   struct CallEnd {
     bool is_known = false;  // as of CallBegan
@@ -142,14 +142,14 @@ class Connections {
   void Orphan(Connection& connection);
   void Shut(Connection& connection, std::string_view reason);
   void ShutTheBusiest();
-  // How many connections of `host` were shut, less those that were forgiven.
+  // How many connections of `host` were shut, less the forgiven ones.
   int StrikesOf(const std::string& host) const;
   // How many calls a connection of `host` may have, and waste within a second.
   int AllowedCalls(const std::string& host) const;
   int AllowedWaste(const std::string& host) const;
   // How many bytes a connection of `host` may send that no call claims.
   int64_t AllowedUnclaimed(const std::string& host) const;
-  // Takes note of what has come and was claimed since the last look.
+  // Takes note of the bytes that have come and were claimed since the last look.
   void CountUnclaimed(Connection& connection, Clock::time_point now) const;
   // Bytes that calls of the connection may have under way.
   int64_t UnderWayOf(const Connection& connection) const;
@@ -167,7 +167,7 @@ class Connections {
   std::unordered_map<std::string, Host> hosts_;  // of which connections were shut lately
   uint64_t next_id_ = 1;
   int64_t calls_ = 0;    // of connections that were not shut
-  int64_t orphans_ = 0;  // of those that were
+  int64_t orphans_ = 0;  // of the calls that were
   uint64_t shut_count_ = 0;
 };
 

@@ -16,7 +16,7 @@
 namespace wellspace::server {
 namespace {
 
-// How often clients that take too long are looked for.
+// The interval of looks for clients that take too long.
 constexpr int kClientLookMs = 500;
 
 std::string Response(const HttpAnswer& answer) {
@@ -32,7 +32,7 @@ struct HttpEndpoint::Client {
   FileDescriptor socket;
   std::chrono::steady_clock::time_point end;  // of our patience
   std::string request;
-  std::string answer;  // what is not sent yet; empty: the request is not whole
+  std::string answer;  // the rest of the answer; empty: the request is not whole
 };
 
 absl::StatusOr<std::unique_ptr<HttpEndpoint>> HttpEndpoint::Start(const std::string& listen, HttpRoutes routes) {
@@ -72,7 +72,7 @@ void HttpEndpoint::Run() {
     if (watched.front().revents != 0) {
       return;
     }
-    // Those that were watched come before those that are accepted now.
+    // Connections that were watched come before those that are accepted now.
     size_t place = 1 + sockets_.size();
     const std::chrono::steady_clock::time_point now = std::chrono::steady_clock::now();
     std::erase_if(clients_, [&](Client& client) {

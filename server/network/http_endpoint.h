@@ -1,4 +1,4 @@
-// HTTP for what looks at a server: Prometheus, probes of Kubernetes, load balancers.
+// HTTP for the programs that look at a server: Prometheus, probes of Kubernetes, load balancers.
 #ifndef WELLSPACE_SERVER_NETWORK_HTTP_ENDPOINT_H_
 #define WELLSPACE_SERVER_NETWORK_HTTP_ENDPOINT_H_
 
@@ -24,7 +24,7 @@ struct HttpAnswer {
   std::string body;
 };
 
-// What is answered to GET and HEAD of a path, "/metrics" for example. Called on the thread of the endpoint, so it must
+// The answer to GET and HEAD of a path, "/metrics" for example. Called on the thread of the endpoint, so it must
 // not block.
 using HttpRoutes = std::map<std::string, std::function<HttpAnswer()>, std::less<>>;
 
@@ -40,8 +40,8 @@ class HttpEndpoint {
   static constexpr size_t kMostRequestBytes = 8192;
   static constexpr std::chrono::seconds kTimeout{5};
 
-  // Listens on `listen`, HOST:PORT with an address or "localhost"; port 0 takes a free one. REQUIRES: what `routes`
-  // read outlives this.
+  // Listens on `listen`, HOST:PORT with an address or "localhost"; port 0 takes a free one. REQUIRES: the objects that
+  // `routes` read outlives this.
   //
   // Errors:     INVALID_ARGUMENT (listen), UNAVAILABLE (the address cannot be listened on).
   static absl::StatusOr<std::unique_ptr<HttpEndpoint>> Start(const std::string& listen, HttpRoutes routes);
@@ -59,7 +59,7 @@ class HttpEndpoint {
 
   void Run();
   void Accept(int socket);
-  // Reads and writes what can be; false when the client is done with.
+  // Reads and writes without waiting; false when the client is done with.
   bool Serve(Client& client) const;
   std::string AnswerTo(const std::string& request) const;
 

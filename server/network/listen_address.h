@@ -1,4 +1,4 @@
-// Where a server listens.
+// The address that a server listens on.
 #ifndef WELLSPACE_SERVER_NETWORK_LISTEN_ADDRESS_H_
 #define WELLSPACE_SERVER_NETWORK_LISTEN_ADDRESS_H_
 

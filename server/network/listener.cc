@@ -23,7 +23,7 @@
 namespace wellspace::server {
 namespace {
 
-// Before another attempt at what failed for want of descriptors or memory.
+// The delay of another attempt, after one that failed for want of descriptors or memory.
 constexpr int kPauseMs = 100;
 
 // While calls of connections that were shut are worked off, how often it is looked whether they are, and how long
@@ -31,7 +31,7 @@ constexpr int kPauseMs = 100;
 constexpr int kWaitMs = 10;
 constexpr std::chrono::milliseconds kMaxWait(500);
 
-// How often connections are looked at whose peers may not read.
+// The interval of looks for connections whose peers do not read.
 constexpr std::chrono::milliseconds kUnreadInterval(5000);
 
 constexpr absl::Duration kLogInterval = absl::Seconds(10);

@@ -25,7 +25,7 @@ namespace wellspace::server {
 //
 // gRPC 1.51 would listen itself, and would never do so again after an accept that failed (CVE-2023-4785). Here a
 // connection that comes when there are hardly any file descriptors left is closed at once, so that some of them stay
-// for files; accepting goes on whatever fails. What becomes of a connection is watched by Connections.
+// for files; accepting goes on whatever fails. Connections watches them from then on.
 //
 // Thread safety: thread-compatible.
 class Listener {

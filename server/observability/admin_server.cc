@@ -31,13 +31,18 @@ class WithoutChannelz final : public grpc::ServerBuilderOption {
 
 void LeaveOutChannelz(grpc::ServerBuilder& builder) { builder.SetOption(std::make_unique<WithoutChannelz>()); }
 
-absl::StatusOr<std::unique_ptr<AdminServer>> AdminServer::Start(const std::string& listen, CallObserver& observer) {
+absl::StatusOr<ListenAddress> AdminServer::AddressOf(const std::string& listen) {
   WELLSPACE_ASSIGN_OR_RETURN(ListenAddress address, ParseListenAddress(listen));
   if (!address.IsLoopback()) {
     return absl::FailedPreconditionError(absl::StrCat(
         "refuses to serve channelz on ", address.ToString(),
         ": it shows the addresses and certificates of all clients; take an address on 127.0.0.1 or [::1]"));
   }
+  return address;
+}
+
+absl::StatusOr<std::unique_ptr<AdminServer>> AdminServer::Start(const std::string& listen, CallObserver& observer) {
+  WELLSPACE_ASSIGN_OR_RETURN(ListenAddress address, AddressOf(listen));
   static std::once_flag once;
   std::call_once(once, grpc::channelz::experimental::InitChannelzService);
   grpc::ServerBuilder builder;

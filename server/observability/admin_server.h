@@ -1,4 +1,4 @@
-// A look at the server's own sockets and calls, for who runs it.
+// A look at the server's own sockets and calls, for its operator.
 #ifndef WELLSPACE_SERVER_OBSERVABILITY_ADMIN_SERVER_H_
 #define WELLSPACE_SERVER_OBSERVABILITY_ADMIN_SERVER_H_
 
@@ -9,18 +9,24 @@
 #include "absl/status/statusor.h"
 #include "grpcpp/server.h"
 #include "grpcpp/server_builder.h"
+#include "server/network/listen_address.h"
 #include "server/observability/call_observer.h"
 
 namespace wellspace::server {
 
 // Channelz shows the addresses and certificates of all peers: it has a listener of its own, on the loopback. gRPC adds
-// channelz to every server of the process, so those of users are to be built without it.
+// channelz to every server of the process, so servers for users are to be built without it.
 void LeaveOutChannelz(grpc::ServerBuilder& builder);
 
 // Serves grpc.channelz.v1 for all gRPC servers and channels of the process, health and reflection, in plain text and to
 // all that can connect, until it is destroyed.
 class AdminServer {
  public:
+  // The address in `listen`, HOST:PORT.
+  //
+  // Errors:     INVALID_ARGUMENT (listen), FAILED_PRECONDITION (not the loopback).
+  static absl::StatusOr<ListenAddress> AddressOf(const std::string& listen);
+
   // Listens on `listen`, HOST:PORT on the loopback; port 0 takes a free one. REQUIRES: `observer` outlives this.
   //
   // Errors:     INVALID_ARGUMENT (listen), FAILED_PRECONDITION (not the loopback), UNAVAILABLE (the address cannot be

@@ -1,4 +1,4 @@
-// The metrics of calls, under the names that dashboards for gRPC know (those of go-grpc-prometheus).
+// The metrics of calls, under the names that dashboards for gRPC know, from go-grpc-prometheus.
 #ifndef WELLSPACE_SERVER_OBSERVABILITY_CALL_METRICS_H_
 #define WELLSPACE_SERVER_OBSERVABILITY_CALL_METRICS_H_
 
@@ -47,7 +47,7 @@ class CallMetrics {
   // REQUIRES:   `registry` outlives this.
   CallMetrics(prometheus::Registry& registry, const std::vector<std::string>& services);
 
-  // The series of `path`, "/wellspace.v1.MeshingService/MeshPoints", or those of unknown methods.
+  // The series of `path`, "/wellspace.v1.MeshingService/MeshPoints", or the series of unknown methods.
   const Method& Of(std::string_view path) const;
 
  private:

@@ -30,7 +30,7 @@ constexpr std::string_view kChannelz = "grpc.channelz.v1.Channelz";
 // https://www.w3.org/TR/trace-context/: version-trace-parent-flags, in lower-case hexadecimal digits.
 constexpr std::string_view kTraceparentShape = "00-00000000000000000000000000000000-0000000000000000-00";
 
-// What a connection takes for a call besides its own bytes: frames of a call's beginning and end, of each header, of
+// The overhead of a call on its connection, in bytes: frames of the call's beginning and end, of each header, of
 // each message. Records of TLS, each of 22 bytes more, are about as long as frames.
 constexpr uint64_t kHeadersOverhead = 512;
 constexpr uint64_t kHeaderOverhead = 16;
@@ -39,15 +39,11 @@ constexpr uint64_t kMessageOverhead = 256;
 constexpr uint64_t kBytesPerOverhead = 16;
 
 // Methods of wellspace.v1 whose requests the services read as bytes.
-constexpr std::array<std::string_view, 9> kReadAsBytes = {"AddSegments",
-                                                          "ApproximateNearestNeighbors",
-                                                          "ClippedVoronoiCells",
-                                                          "DownloadMesh",
-                                                          "EstimateMesh",
-                                                          "MeshPoints",
-                                                          "SetSizes",
-                                                          "UploadPoints",
-                                                          "VoronoiCells"};
+constexpr std::array<std::string_view, 10> kReadAsBytes = {
+    "AddSegments",         "AddTriangles", "ApproximateNearestNeighbors",
+    "ClippedVoronoiCells", "DownloadMesh", "EstimateMesh",
+    "MeshPoints",          "SetSizes",     "UploadPoints",
+    "VoronoiCells"};
 
 // How many bytes a request has that an interceptor is shown, which does not learn its type. A test sends one to each
 // method.
@@ -213,7 +209,7 @@ class CallObserver::Interceptor final : public grpc::experimental::Interceptor {
     }
   }
 
-  // How many bytes came for a message, and what frames and TLS add to them.
+  // The bytes that came for a message, with those that frames and TLS add.
   uint64_t BytesOf(const void* message) const {
     const uint64_t bytes = message_bytes_(message);
     return bytes + bytes / kBytesPerOverhead;

@@ -1,4 +1,4 @@
-// What is known of every call: a line of the log, and the metrics of its method.
+// The traces of every call: a line of the log, and the metrics of its method.
 #ifndef WELLSPACE_SERVER_OBSERVABILITY_CALL_OBSERVER_H_
 #define WELLSPACE_SERVER_OBSERVABILITY_CALL_OBSERVER_H_
 
@@ -22,7 +22,7 @@ class Connections;
 
 // Watches all calls of a server, whatever the service, from an interceptor.
 //
-// A call's line in the log has event=call, request_id (what the client sent as metadata `x-request-id`, if it is at
+// A call's line in the log has event=call, request_id (the value of the client's metadata `x-request-id`, if it is at
 // most 64 letters, digits and ".-_", else one made here), tenant, peer, service, method, code, seconds, what its
 // handler notes, traceparent (of W3C Trace Context, if the client sent one) and the message of its error. No other
 // metadata and nothing of the messages is logged. The request id goes back to the client as trailing metadata

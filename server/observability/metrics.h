@@ -1,4 +1,4 @@
-// What a server tells Prometheus.
+// The metrics of a server, for Prometheus.
 #ifndef WELLSPACE_SERVER_OBSERVABILITY_METRICS_H_
 #define WELLSPACE_SERVER_OBSERVABILITY_METRICS_H_
 
@@ -12,7 +12,7 @@
 
 namespace wellspace::server {
 
-// The metrics of one server: those that are counted where they happen, and those that are read when Prometheus asks.
+// The metrics of one server: some are counted where they happen, others are read when Prometheus asks.
 //
 // Thread safety: thread-safe, once all have been added.
 class Metrics {

@@ -10,7 +10,7 @@
 namespace wellspace::server {
 namespace {
 
-// Those of the server, and those that gRPC adds.
+// The services of the server, and the two that gRPC adds.
 std::vector<std::string> AndThoseOfGrpc(std::vector<std::string> services) {
   services.insert(services.end(), {"grpc.reflection.v1alpha.ServerReflection", "grpc.channelz.v1.Channelz"});
   return services;
@@ -72,6 +72,13 @@ void Observability::Watch(grpc::ServerBuilder& builder) {
   interceptors.push_back(calls_.MakeInterceptors());
   builder.experimental().SetInterceptorCreators(std::move(interceptors));
   LeaveOutChannelz(builder);
+}
+
+absl::Status Observability::Check(const ObservabilityOptions& options) {
+  if (!options.metrics_listen.empty()) {
+    WELLSPACE_RETURN_IF_ERROR(ParseListenAddress(options.metrics_listen).status());
+  }
+  return options.admin_listen.empty() ? absl::OkStatus() : AdminServer::AddressOf(options.admin_listen).status();
 }
 
 absl::Status Observability::ListenForHttp(const ObservabilityOptions& options) {

@@ -28,13 +28,13 @@ struct ObservabilityOptions {
   std::string admin_listen;    // gRPC, channelz; the loopback only
 };
 
-// Whether a server takes calls; what /readyz says.
+// Whether a server takes calls; the answer of /readyz.
 enum class Readiness { kRestoring, kReady, kStopping };
 
 // Thread safety: thread-safe.
 class Observability {
  public:
-  // `services` are the full names of those that the server has. REQUIRES: `connections` outlives this, and this the
+  // `services` are the full names of the server's services. REQUIRES: `connections` outlives this, and this the
   // server.
   Observability(const std::vector<std::string>& services, std::shared_ptr<spdlog::logger> log, Connections& connections,
                 CallObserver::TenantOf tenant_of);
@@ -48,18 +48,23 @@ class Observability {
   // Has the server of `builder` watched, and serve no channelz to its users.
   void Watch(grpc::ServerBuilder& builder);
 
+  // Holds the addresses of `options` to the rules, without listening.
+  //
+  // Errors:     those of ListenForHttp and ListenForAdmin about the text of an address.
+  static absl::Status Check(const ObservabilityOptions& options);
+
   // Serves /metrics, /livez and /readyz. To be called once, when metrics() is complete; runs until Stop. It may be
   // called while sessions are restored, so that probes see a server that is alive and not ready.
   //
-  // Errors:     those of HttpEndpoint::Start.
+  // Errors:     as of HttpEndpoint::Start.
   absl::Status ListenForHttp(const ObservabilityOptions& options);
 
   // Serves channelz. To be called once, after the server has been started; runs until Stop.
   //
-  // Errors:     those of AdminServer::Start.
+  // Errors:     as of AdminServer::Start.
   absl::Status ListenForAdmin(const ObservabilityOptions& options);
 
-  // What /readyz says from now on. A server begins with kRestoring.
+  // Sets the answer of /readyz. A server begins with kRestoring.
   void SetReadiness(Readiness readiness) { readiness_ = readiness; }
 
   // HOST:PORT with the port in use; empty: not served.

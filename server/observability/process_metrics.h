@@ -1,4 +1,4 @@
-// What every process tells Prometheus about itself.
+// The metrics that every process gives Prometheus about itself.
 #ifndef WELLSPACE_SERVER_OBSERVABILITY_PROCESS_METRICS_H_
 #define WELLSPACE_SERVER_OBSERVABILITY_PROCESS_METRICS_H_
 

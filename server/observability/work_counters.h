@@ -1,4 +1,4 @@
-// How much the service has done since it started.
+// Counters of the service's work since its start.
 #ifndef WELLSPACE_SERVER_OBSERVABILITY_WORK_COUNTERS_H_
 #define WELLSPACE_SERVER_OBSERVABILITY_WORK_COUNTERS_H_
 

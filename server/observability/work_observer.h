@@ -1,4 +1,4 @@
-// What of the work itself is logged and counted.
+// Logs and counts of the work itself: refinements, meshes, points and queries.
 #ifndef WELLSPACE_SERVER_OBSERVABILITY_WORK_OBSERVER_H_
 #define WELLSPACE_SERVER_OBSERVABILITY_WORK_OBSERVER_H_
 
@@ -12,7 +12,7 @@
 
 namespace wellspace::server {
 
-// How the refinement of a session has ended.
+// A report on the end of a session's refinement.
 struct RefinementReport {
   std::string operation;  // its name
   std::string tenant;
@@ -32,7 +32,7 @@ struct StructureReport {
   absl::Duration idle;  // since the session was used last
 };
 
-// Is told what work was done, logs it and counts it. The code that does the work knows neither the log nor the metrics.
+// Logs the work that was done, and counts it. The code that does the work knows neither the log nor the metrics.
 //
 // Thread safety: thread-safe.
 class WorkObserver {

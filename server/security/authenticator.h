@@ -1,4 +1,4 @@
-// Who calls: every handler asks before it does anything else.
+// The caller of a call: every handler asks for it before it does anything else.
 #ifndef WELLSPACE_SERVER_SECURITY_AUTHENTICATOR_H_
 #define WELLSPACE_SERVER_SECURITY_AUTHENTICATOR_H_
 
@@ -23,7 +23,7 @@ struct Caller {
 // Thread safety: thread-safe.
 class Authenticator {
  public:
-  // What a caller has to show. With both, the certificate only has to be there and the token names the tenant.
+  // The credentials of a caller. With both, the certificate only has to be there and the token names the tenant.
   struct Demands {
     std::shared_ptr<const TokenTable> tokens;  // null: no token
     bool client_certificate = false;           // the tenant is the common name of its subject
@@ -35,8 +35,8 @@ class Authenticator {
 
   // The caller of the call that has `context`. Neither waits nor does I/O.
   //
-  // Guarantees: the message of an error has nothing of what the caller showed.
-  // Errors:     UNAUTHENTICATED: the call is to be ended at once, without a look at what it asks for.
+  // Guarantees: the message of an error has nothing of the caller's credentials.
+  // Errors:     UNAUTHENTICATED: the call is to be ended at once, without a look at its request.
   absl::StatusOr<Caller> Authenticate(const grpc::ServerContextBase& context) const;
 
   // These are for calls that come from now on.

@@ -42,7 +42,7 @@ absl::StatusOr<std::string> ReadFile(const std::string& path) {
   return content;
 }
 
-// How a file is; all zero when there is none.
+// The state of a file; all zero when there is none.
 struct FileWatch::Mark {
   uint64_t device = 0;
   uint64_t inode = 0;

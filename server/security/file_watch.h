@@ -27,7 +27,7 @@ absl::StatusOr<std::string> ReadFile(const std::string& path);
 // Thread safety: thread-compatible. `on_change` runs on a thread of its own.
 class FileWatch {
  public:
-  // Takes down how the files are. What is read after this and before Start is not older than what is noticed later.
+  // Notes the state of the files. Changes after this are noticed, so that contents read before Start do not stay stale.
   explicit FileWatch(std::vector<std::string> paths);
   // Waits for on_change if it runs.
   ~FileWatch();

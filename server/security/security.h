@@ -1,4 +1,4 @@
-// What a server demands of those who connect, and how it comes by it.
+// The credentials that a server demands of its peers, and how it comes by its own.
 #ifndef WELLSPACE_SERVER_SECURITY_SECURITY_H_
 #define WELLSPACE_SERVER_SECURITY_SECURITY_H_
 
@@ -23,14 +23,14 @@ struct SecurityOptions {
   bool insecure_remote = false;  // allows remote listeners without TLS, or without any demand on callers
   absl::Duration reload_interval = absl::Seconds(1);  // how often files are looked at
 
-  // Clients with certificates are asked to connect anew after so long, so that those that have expired or lost their
-  // authority get no further. Calls under way are not disturbed.
+  // Clients with certificates are asked to connect anew after this time, so that clients that have expired or lost
+  // their authority get no further. Calls under way are not disturbed.
   absl::Duration max_connection_age = absl::Hours(1);
 };
 
 // Certificates and tokens, read again when their files change.
 //
-// A file that has become unreadable or wrong is reported in the log, and what was read before stays in use: the tokens
+// A file that has become unreadable or wrong is reported in the log, and the old contents stay in use: the tokens
 // that were known, or all of certificates, key and authorities.
 //
 // Thread safety: thread-safe.
@@ -45,7 +45,12 @@ class Security {
 
   const Authenticator& authenticator() const { return authenticator_; }
 
-  // Has `builder` take connections that come to `address`, from what is returned.
+  // Whether connections may come to `address`.
+  //
+  // Errors:     FAILED_PRECONDITION, as of AddAcceptor.
+  absl::Status CheckAddress(const ListenAddress& address) const;
+
+  // Has `builder` take connections that come to `address`, from the object returned.
   //
   // Errors:     FAILED_PRECONDITION: other machines could reach it, in plain text or without having to say who they
   //             are, and nothing says that this is wanted.
@@ -57,7 +62,6 @@ class Security {
 
   void Watch();
   absl::StatusOr<TokenTable> ReadTokens() const;
-  absl::Status CheckAddress(const ListenAddress& address) const;
   void OnTokensChange();
   void OnTlsChange();
 

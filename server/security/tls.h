@@ -20,14 +20,14 @@ struct TlsOptions {
   std::string key;          // of the server's certificate, not encrypted
   std::string client_ca;    // authorities whose client certificates are taken; empty: clients are not asked for any
   // A client without a certificate does not get through the handshake. Otherwise it gets as far as its first call,
-  // which is told what is missing.
+  // which is told the missing part.
   bool require_client_certificate = false;
 
   bool enabled() const { return !certificate.empty() || !key.empty() || !client_ca.empty(); }
   std::vector<std::string> Files() const;
 };
 
-// What these files have, all of it in PEM.
+// The contents of these files, in PEM.
 struct TlsMaterial {
   std::string certificate;
   std::string key;
@@ -36,12 +36,12 @@ struct TlsMaterial {
 
 // Reads the files, if connections can be made with them.
 //
-// Errors:     INVALID_ARGUMENT: a file is missing among the options, or has not what it should have: certificates that
+// Errors:     INVALID_ARGUMENT: a file is missing among the options, or has not the right contents: certificates that
 //             are valid now, the key of the first; the message names the file. NOT_FOUND and so on: a file cannot be
 //             read.
 absl::StatusOr<TlsMaterial> ReadTlsFiles(const TlsOptions& options);
 
-// What new connections are made with, all of it replaced at once while a server runs.
+// The certificate, the key and the client CA of new connections, replaced at once while a server runs.
 //
 // Thread safety: thread-safe.
 class TlsSource {

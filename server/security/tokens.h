@@ -15,7 +15,7 @@ namespace wellspace::server {
 // digit. Such a name forges nothing in a log.
 bool IsTenantName(std::string_view name);
 
-// Which tenant a token belongs to.
+// The table of tokens, each with its tenant.
 //
 // Tokens are looked up by their SHA-256, without salt: they are random and at least kMinTokenLength long, so that no
 // list of likely tokens exists, and a call costs one hash however many tokens there are.
@@ -26,7 +26,7 @@ class TokenTable {
   static constexpr size_t kMinTokenLength = 32;
   static constexpr size_t kMaxTokenLength = 4096;
 
-  // Reads lines "TENANT sha256:HEX". Empty lines and what follows a '#' are ignored; a tenant may have several tokens.
+  // Reads lines "TENANT sha256:HEX". Empty lines, and all after a '#', are ignored; a tenant may have several tokens.
   //
   // Errors:     INVALID_ARGUMENT, with the number of the line and what would be accepted, when a line is none of these,
   //             a token comes twice, or there is none at all.

@@ -1,4 +1,4 @@
-// Where the next page of a list begins.
+// Page tokens: the place where the next page of a list begins.
 #ifndef WELLSPACE_SERVER_SERVICES_PAGE_TOKEN_H_
 #define WELLSPACE_SERVER_SERVICES_PAGE_TOKEN_H_
 

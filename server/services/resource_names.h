@@ -1,4 +1,4 @@
-// From the names of sessions and operations in requests to what they name.
+// Finds sessions and operations by their names in requests.
 #ifndef WELLSPACE_SERVER_SERVICES_RESOURCE_NAMES_H_
 #define WELLSPACE_SERVER_SERVICES_RESOURCE_NAMES_H_
 

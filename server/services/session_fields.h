@@ -10,7 +10,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/time/time.h"
-#include "core/mesh_parameters.h"
+#include "core/input/mesh_parameters.h"
 #include "google/protobuf/duration.pb.h"
 #include "google/protobuf/map.h"
 #include "server/base/options.h"

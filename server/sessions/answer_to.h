@@ -1,4 +1,4 @@
-// What is written down as the answer to a request with a change that it asks for.
+// The record of the answer to a request, which the log keeps with the change that the request asks for.
 #ifndef WELLSPACE_SERVER_SESSIONS_ANSWER_TO_H_
 #define WELLSPACE_SERVER_SESSIONS_ANSWER_TO_H_
 
@@ -9,8 +9,8 @@
 
 namespace wellspace::server {
 
-// What is written down as the answer to the request that a change is made for, given what it is answered with. It is
-// called once the change is certain to be made, unless it cannot be written down.
+// Makes the record of the answer to the request for a change; the argument is the answer itself. It is called once the
+// change is certain to be made, unless the log cannot write it down.
 template <typename T>
 using AnswerTo = std::function<std::optional<store::v1::AnswerRecord>(const T&)>;
 

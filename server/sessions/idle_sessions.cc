@@ -23,7 +23,7 @@ std::vector<size_t> ChooseIdle(std::span<const Session::Spare> sessions, uint64_
   if (freed < missing && want == MemoryBudget::Want::kAllOrNothing) {
     return {};
   }
-  // What a session that comes late frees may be enough without some before it: those used last stay first.
+  // The sessions chosen last may free enough without some chosen before. Those used last are spared first.
   std::ranges::reverse(chosen);
   std::erase_if(chosen, [&](size_t i) {
     const bool is_needless = freed >= missing + sessions[i].bytes;

@@ -15,7 +15,7 @@
 
 namespace wellspace::server {
 
-// Which of `sessions` give up memory so that `missing` bytes become free: their indices, ascending.
+// Chooses from `sessions` those that give up memory, so that `missing` bytes become free: their indices, ascending.
 //
 // Guarantees: (1) together they have `missing` bytes; if all have less, all are chosen or, for kAllOrNothing, none;
 //             (2) where they have as much, none of them could be left out; (3) none that is left out was used before

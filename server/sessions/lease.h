@@ -1,4 +1,4 @@
-// How long a session lives without being used.
+// The lease of a session: the time that it lives without being used.
 #ifndef WELLSPACE_SERVER_SESSIONS_LEASE_H_
 #define WELLSPACE_SERVER_SESSIONS_LEASE_H_
 
@@ -20,7 +20,7 @@ class Lease {
   // Counted from the last use on, like the one before.
   void SetTtl(absl::Duration ttl) { ttl_ = ttl; }
 
-  // When it runs out unless it is used again before.
+  // The time when it runs out, unless it is used again before.
   absl::Duration ExpiresAt(absl::Duration now) const { return (uses_ > 0 ? now : last_use_) + ttl_; }
   bool HasExpired(absl::Duration now) const { return ExpiresAt(now) <= now; }
 

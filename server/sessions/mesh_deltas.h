@@ -30,8 +30,8 @@ class MeshDeltas {
   // Whether the difference from the mesh of this revision, which is the last one, is of use.
   bool IsWanted(uint64_t revision) const;
 
-  // The session has another mesh now, of `mesh_bytes`, to which `delta` leads; null: none does. Returns what is not
-  // kept any more, to be freed without locks.
+  // The session has another mesh now, of `mesh_bytes`, to which `delta` leads; null: none does. Returns the differences
+  // that are not kept any more, to be freed without locks.
   [[nodiscard]] std::vector<Delta> Advance(Delta delta, uint64_t mesh_bytes);
 
   // Those that lead from the mesh of revision `since` to that of `revision`, one after the other; none if both are the
@@ -40,9 +40,9 @@ class MeshDeltas {
   // Errors:     DELTA_NOT_KEPT, naming the revisions since which there are some.
   absl::StatusOr<std::vector<Delta>> Between(uint64_t since, uint64_t revision) const;
 
-  // What they take in memory.
+  // Memory of the differences, in bytes.
   uint64_t memory_bytes() const;
-  // Gives all up; they are freed with what is returned.
+  // Gives all up; their memory is freed with the vector that is returned.
   [[nodiscard]] std::vector<Delta> GiveUp();
 
  private:

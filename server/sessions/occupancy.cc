@@ -6,7 +6,15 @@
 
 namespace wellspace::server {
 
+absl::Status Elsewhere(const std::string& session) {
+  return MakeError(v1::ERROR_REASON_SESSION_ELSEWHERE,
+                   absl::StrCat(session, " has been taken over by another server; ask that one"));
+}
+
 absl::Status CheckOpen(const Occupancy& occupancy, const std::string& session) {
+  if (occupancy.is_elsewhere) {
+    return Elsewhere(session);
+  }
   return occupancy.is_closed
              ? MakeError(v1::ERROR_REASON_SESSION_NOT_FOUND,
                          absl::StrCat(session, " does not exist any more: it was deleted, or has expired"))

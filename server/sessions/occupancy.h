@@ -1,4 +1,4 @@
-// Who is at work on a session.
+// The occupancy of a session: the work and the calls that use it.
 #ifndef WELLSPACE_SERVER_SESSIONS_OCCUPANCY_H_
 #define WELLSPACE_SERVER_SESSIONS_OCCUPANCY_H_
 
@@ -12,10 +12,10 @@
 
 namespace wellspace::server {
 
-// Which work has a session to itself. There is one at most.
+// The work that has a session to itself. There is one at most.
 enum class Busy { kNo, kStarting, kOperation, kAddingVertices, kRemovingPoints, kReplaying };
 
-// Who is at work on one session of one process: the work that has it to itself, an upload, queries, and what keeps its
+// The users of one session of one process: the work that has it to itself, an upload, queries, and calls that keep its
 // structure; whether it has been closed, and until when it lives without any of these. Nothing of this is written down.
 //
 // Thread safety: thread-compatible; the session guards it.
@@ -24,6 +24,7 @@ struct Occupancy {
   Lease lease;
   Busy busy = Busy::kNo;
   bool is_closed = false;
+  bool is_elsewhere = false;  // another server has taken the session over; it is closed here, too
   bool is_uploading = false;
   int queries = 0;         // batches that run
   int structure_uses = 0;  // while there are any, the mesher is not given up for other work
@@ -37,22 +38,24 @@ struct Occupancy {
     busy = Busy::kNo;
     lease.EndUse(now);
   }
-  // Whether no one would miss the structure.
+  // Whether no work and no query needs the structure.
   bool IsIdle() const { return busy == Busy::kNo && structure_uses == 0; }
 };
 
 // For absl::Condition: to be waited for by work that has made the session busy, so that no query begins.
 inline bool HasNoQueries(Occupancy* occupancy) { return occupancy->queries == 0; }
 
-// Refuses what a session that was closed does not do any more.
+// Refuses requests that a closed session does not serve any more.
 //
-// Errors:     SESSION_NOT_FOUND.
+// Errors:     SESSION_NOT_FOUND, SESSION_ELSEWHERE.
 absl::Status CheckOpen(const Occupancy& occupancy, const std::string& session);
-// Refuses what has to wait for the work that has the session, too.
+// The error of every call to a session that another server owns.
+absl::Status Elsewhere(const std::string& session);
+// CheckOpen; also refuses requests that have to wait for the work that has the session.
 //
 // Errors:     SESSION_NOT_FOUND, SESSION_BUSY.
 absl::Status CheckIdle(const Occupancy& occupancy, const SessionState& state);
-// Refuses a change that was asked for at another revision, too. `points`: those that were appended. `expected_revision`
+// CheckIdle; also refuses a change that was asked for at another revision. `points`: all appended. `expected_revision`
 // 0: any.
 //
 // Errors:     SESSION_NOT_FOUND, SESSION_BUSY, REVISION_MISMATCH.

@@ -15,7 +15,7 @@
 
 #include "absl/status/status.h"
 #include "absl/time/time.h"
-#include "core/mesh_parameters.h"
+#include "core/input/mesh_parameters.h"
 #include "server/jobs/job.h"
 #include "server/sessions/progress_pacer.h"
 #include "wellspace/store/v1/records.pb.h"
@@ -39,7 +39,7 @@ class Operation {
   // are its own, as the core takes them.
   Operation(std::string name, std::shared_ptr<const store::v1::OperationRecord> record,
             core::MeshParameters parameters);
-  // What was written down as `record`, as the next process has it. One that had not ended waits for a worker again.
+  // The record for the next process, made of that in the log. An operation that had not ended waits for a worker again.
   static std::shared_ptr<const store::v1::OperationRecord> Resumed(
       std::shared_ptr<const store::v1::OperationRecord> record);
 
@@ -75,7 +75,7 @@ class Operation {
   // ProgressPacer::kMinInterval; `now` is a time since boot.
   bool Tick(absl::Duration now);
 
-  // What is written down of it: as it is now, or as it is once Apply has taken it.
+  // The records for the log: of the operation as it is now, or as it is once Apply has taken the record.
   store::v1::OperationRecord Record() const;
   store::v1::OperationRecord RecordOfStart(absl::Time now) const;
   // The figures are those of the new mesh.

@@ -103,19 +103,19 @@ absl::Status PointAccount::Take(uint64_t count) {
   return Grow(held, "points");
 }
 
-absl::Status PointAccount::TakeFeatures(uint64_t segments, uint64_t seeds) {
+absl::Status PointAccount::TakeFeatures(const FeatureCounts& counts) {
   Held held = held_;
-  held.segments += segments;
-  held.seeds += seeds;
-  WELLSPACE_RETURN_IF_ERROR(CheckOne(held.segments, "segments"));
-  WELLSPACE_RETURN_IF_ERROR(CheckOne(held.seeds, "seeds"));
-  return Grow(held, "points, segments and seeds");
+  held.features = held.features + counts;
+  WELLSPACE_RETURN_IF_ERROR(CheckOne(held.features.segments, "segments"));
+  WELLSPACE_RETURN_IF_ERROR(CheckOne(held.features.triangles, "triangles"));
+  WELLSPACE_RETURN_IF_ERROR(CheckOne(held.features.seeds, "seeds"));
+  return Grow(held, "points, segments, triangles and seeds");
 }
 
 absl::Status PointAccount::TakeSizes(uint64_t count) {
   Held held = held_;
   held.sizes += count;
-  return Grow(held, "points, segments, seeds and sizes");
+  return Grow(held, "points, segments, triangles, seeds and sizes");
 }
 
 absl::Status PointAccount::CheckMesh(uint64_t bytes) const {
@@ -171,10 +171,9 @@ void PointAccount::Return(uint64_t count) {
   Shrink(held);
 }
 
-void PointAccount::ReturnFeatures(uint64_t segments, uint64_t seeds) {
+void PointAccount::ReturnFeatures(const FeatureCounts& counts) {
   Held held = held_;
-  held.segments -= segments;
-  held.seeds -= seeds;
+  held.features = held.features - counts;
   Shrink(held);
 }
 

@@ -1,4 +1,4 @@
-// How many points, segments, seeds and sizes a session has, how many bytes it keeps, and what it may have.
+// The account of a session: its points, features, sizes and bytes, within the limits of its tenant.
 #ifndef WELLSPACE_SERVER_SESSIONS_POINT_ACCOUNT_H_
 #define WELLSPACE_SERVER_SESSIONS_POINT_ACCOUNT_H_
 
@@ -10,18 +10,18 @@
 
 #include "absl/status/status.h"
 #include "server/base/options.h"
+#include "server/inputs/feature_store.h"
 #include "server/jobs/memory_budget.h"
-#include "server/sessions/feature_store.h"
 
 namespace wellspace::server {
 
-// What sessions have.
+// The storage that sessions take.
 struct StoredAmount {
-  uint64_t points = 0;  // each segment, seed and size counts as one, too
+  uint64_t points = 0;  // each segment, triangle, seed and size counts as one, too
   uint64_t bytes = 0;   // of these and of meshes, wherever they are kept
 };
 
-// What all sessions of one tenant have.
+// The storage that all sessions of one tenant take.
 //
 // Thread safety: thread-safe.
 // Invariants: amount() is at most the limits that Take was called with.
@@ -30,15 +30,15 @@ class TenantPoints {
   enum class Outcome { kTaken, kTooManyPoints, kTooManyBytes, kNoRoom };
   struct Taken {
     Outcome outcome;
-    StoredAmount amount;  // what there is now, or, if it was not taken, would be
+    StoredAmount amount;  // that there is now, or, if it was not taken, would be
   };
 
   StoredAmount amount() const;
 
   // Takes `more` if there is then at most `limits`, and if `reserve` says that there is room for it. It is called with
-  // the lock of this held, and may take the lock of a MemoryBudget. No limit of bytes refuses what has none.
+  // the lock of this held, and may take the lock of a MemoryBudget. No limit of bytes refuses a demand without any.
   //
-  // Guarantees: (1) what is not kTaken changes nothing; (2) in no moment do other calls see what is not taken in the
+  // Guarantees: (1) a call without kTaken changes nothing; (2) in no moment do other calls see a refused demand in the
   //             end.
   Taken Take(const StoredAmount& more, const StoredAmount& limits, const std::function<bool()>& reserve);
   // REQUIRES:   no more than amount().
@@ -49,8 +49,8 @@ class TenantPoints {
   StoredAmount amount_;  // guarded by mutex_
 };
 
-// The points, segments, seeds, sizes and mesh of one session, counted against four limits: that of a session, which
-// holds for points, segments and seeds each, and for a set of sizes where it comes; those of its tenant, for their
+// The points, features, sizes and mesh of one session, counted against four limits: that of a session, which holds for
+// points, segments, triangles and seeds each, and for a set of sizes where it comes; those of its tenant, for their
 // number and for the bytes of all; and the memory of the server, in which meshes are not counted here.
 //
 // Thread safety: thread-compatible; accounts of one tenant may be used on different threads.
@@ -67,7 +67,7 @@ class PointAccount {
   PointAccount& operator=(const PointAccount&) = delete;
 
   uint64_t points() const { return held_.points; }
-  // What counts against the tenant's bytes.
+  // The bytes that count against the tenant's limit.
   uint64_t stored_bytes() const { return AmountOf(held_).bytes; }
 
   // Takes `count` more points into the account.
@@ -77,8 +77,8 @@ class PointAccount {
   //             are being refused on another thread.
   // Errors:     TOO_MANY_POINTS, QUOTA_EXCEEDED, STORAGE_QUOTA_EXCEEDED, MEMORY_LIMIT.
   absl::Status Take(uint64_t count);
-  // The same for so many more segments and seeds.
-  absl::Status TakeFeatures(uint64_t segments, uint64_t seeds);
+  // The same for so many more features.
+  absl::Status TakeFeatures(const FeatureCounts& counts);
 
   // The same for `count` more sizes at points.
   absl::Status TakeSizes(uint64_t count);
@@ -87,30 +87,29 @@ class PointAccount {
   //
   // Errors:     STORAGE_QUOTA_EXCEEDED.
   absl::Status CheckMesh(uint64_t bytes) const;
-  // Takes what it has more than the one that is there. To be followed by SettleMesh.
+  // Takes the bytes that it has more than the one that is there. To be followed by SettleMesh.
   absl::Status TakeMesh(uint64_t bytes);
-  // The mesh has so many bytes now, no more than what was taken.
+  // The mesh has so many bytes now, no more than were taken.
   void SettleMesh(uint64_t bytes);
 
-  // What an account holds.
+  // The amounts that an account holds.
   struct Held {
     uint64_t points = 0;
-    uint64_t segments = 0;
-    uint64_t seeds = 0;
+    FeatureCounts features{};
     uint64_t sizes = 0;  // of all sets that the session keeps
     uint64_t mesh_bytes = 0;
 
-    uint64_t count() const { return points + segments + seeds + sizes; }
+    uint64_t count() const { return points + features.all() + sizes; }
   };
-  // Takes what the session had before the server was started, whatever the limits are now. To be called first.
+  // Takes the amounts of the session before the start of the server, whatever the limits are now. To be called first.
   void Restore(const Held& held);
 
   // Takes the last `count` points out again.
   //
   // REQUIRES:   count <= points().
   void Return(uint64_t count);
-  // The same of segments and seeds.
-  void ReturnFeatures(uint64_t segments, uint64_t seeds);
+  // The same of features.
+  void ReturnFeatures(const FeatureCounts& counts);
   void ReturnSizes(uint64_t count);
 
   // From now on the points do not count as the tenant's. They keep their memory as long as this lives.
@@ -119,22 +118,21 @@ class PointAccount {
  private:
   // In memory.
   uint64_t BytesOf(const Held& held) const {
-    return held.points * bytes_per_point_ + FeatureStore::BytesOf(held.segments, held.seeds) +
-           held.sizes * bytes_per_size_;
+    return held.points * bytes_per_point_ + FeatureBytes(held.features) + held.sizes * bytes_per_size_;
   }
   // Wherever it is kept.
   StoredAmount AmountOf(const Held& held) const {
-    const uint64_t bytes = held.points * stored_bytes_per_point_ + FeatureStore::BytesOf(held.segments, held.seeds) +
+    const uint64_t bytes = held.points * stored_bytes_per_point_ + FeatureBytes(held.features) +
                            held.sizes * bytes_per_size_ + held.mesh_bytes;
     return {.points = held.count(), .bytes = bytes};
   }
   StoredAmount Limits() const;
-  // What `held` has more than there is. REQUIRES: no less.
+  // The excess of `held` over the amounts in the account. REQUIRES: no amount is less.
   StoredAmount MoreOf(const Held& held) const;
   absl::Status AboveBytes(const StoredAmount& would_be, uint64_t more, const char* what) const;
   // Refuses `count` of `what`, if a session may not have as many.
   absl::Status CheckOne(uint64_t count, const char* what) const;
-  // Makes `held` what the account has. REQUIRES: no more than it has.
+  // Makes the account hold `held`. REQUIRES: no amount is more than it holds.
   void Shrink(const Held& held);
   // REQUIRES: no less than it has.
   absl::Status Grow(const Held& held, const char* what);

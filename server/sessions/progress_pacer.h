@@ -1,4 +1,4 @@
-// Which progress is worth an event.
+// The choice of the progress that is worth an event.
 #ifndef WELLSPACE_SERVER_SESSIONS_PROGRESS_PACER_H_
 #define WELLSPACE_SERVER_SESSIONS_PROGRESS_PACER_H_
 

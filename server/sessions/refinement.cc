@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "core/base/status_macros.h"
-#include "core/mesh_delta.h"
-#include "core/mesher.h"
+#include "core/mesh/mesh_delta.h"
+#include "core/meshers/mesher.h"
 #include "server/base/clock.h"
 #include "server/jobs/job_size.h"
 #include "server/observability/work_observer.h"
@@ -24,8 +24,8 @@
 namespace wellspace::server {
 namespace {
 
-// From below upwards: StartRefinement and ResumeRefinements submit a job (Submit). On a worker it takes what the
-// session gives it (Run), has the memory counted (Work) and the mesh made (MakeMesh: MeshFirst, or BringBack and
+// From below upwards: StartRefinement and ResumeRefinements submit a job (Submit). On a worker it takes the work
+// of the session (Run), has the memory counted (Work) and the mesh made (MakeMesh: MeshFirst, or BringBack and
 // MeshAgain), and ends the operation (EndWhenPossible).
 
 // Before the end of an operation is written down again for which the disk had no room.
@@ -78,8 +78,8 @@ absl::StatusOr<core::Mesh> MeshAgain(const SessionInputs& inputs, const core::Me
   return mesh;
 }
 
-// What makes the last mesh `next`, if clients may want it, and it is small. Null otherwise, and where memory does not
-// allow it: they download the mesh then.
+// The difference from the last mesh to `next`, if clients may want it, and it is small. Null otherwise, and where
+// memory does not allow it: they download the mesh then.
 std::shared_ptr<DeltaSnapshot> MakeDelta(const Session& session, const SessionInputs& inputs, const core::Mesh& next,
                                          const core::RunContext& context, const SessionWork& work) {
   const MeshSnapshot& last = *work.mesh;
@@ -90,7 +90,7 @@ std::shared_ptr<DeltaSnapshot> MakeDelta(const Session& session, const SessionIn
   const absl::Status status = RunGuarded([&]() -> absl::Status {
     const uint64_t most = last.loaded_bytes() / 2;  // beyond it, the whole mesh is hardly more
     WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(work.mesher->memory_bytes() + 2 * last.loaded_bytes() +
-                                                  core::DeltaScratchBytes(last.figures().simplices) + most));
+                                                  core::DeltaScratchBytes(last.record().simplices()) + most));
     WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<const core::Mesh> base, last.Whole(context));
     WELLSPACE_ASSIGN_OR_RETURN(const core::MeshDelta delta, core::DiffMeshes(*base, next, most, context));
     made = std::make_shared<DeltaSnapshot>(last.revision(), NextRevision(*inputs.state), delta, next);
@@ -99,13 +99,13 @@ std::shared_ptr<DeltaSnapshot> MakeDelta(const Session& session, const SessionIn
   return status.ok() ? made : nullptr;
 }
 
-// What an operation has made.
+// The results of an operation.
 struct Made {
   std::shared_ptr<MeshSnapshot> mesh{};
   std::shared_ptr<DeltaSnapshot> delta{};  // null: none
 };
 
-// Has the mesh made, by what the session has given for it; `is_first`: by its points alone. What did not succeed leaves
+// Has the mesh made, of the session's data; `is_first`: by its points alone. A failure leaves
 // nothing behind: a mesher that it has changed is given up, and comes back by Replay.
 absl::StatusOr<Made> MakeMesh(const MesherFactory& create_mesher, const Session& session, const SessionInputs& inputs,
                               const core::MeshParameters& parameters, bool is_first, Job& job, SessionWork& work) {
@@ -137,7 +137,7 @@ absl::StatusOr<Made> MakeMesh(const MesherFactory& create_mesher, const Session&
   return status;
 }
 
-// The same, in the memory of `job`; what mesher, mesh and delta have of it is theirs at the end, and the rest is
+// The same, in the memory of `job`; the part of mesher, mesh and delta is theirs at the end, and the rest is
 // released.
 absl::StatusOr<Made> Work(const MesherFactory& create_mesher, const Session& session, const SessionInputs& inputs,
                           const core::MeshParameters& parameters, bool is_first, Job& job, SessionWork& work) {
@@ -199,8 +199,8 @@ void Run(const CallEnvironment& environment, const std::shared_ptr<Session>& ses
   report.status = made.status();
   report.duration = SinceBoot() - start;
   if (made.ok()) {
-    report.vertices = made->mesh->figures().vertices;
-    report.simplices = made->mesh->figures().simplices;
+    report.vertices = made->mesh->record().vertices();
+    report.simplices = made->mesh->record().simplices();
   } else {
     made = Made();
   }
@@ -229,7 +229,7 @@ absl::StatusOr<std::shared_ptr<Job>> Submit(const CallEnvironment& environment, 
                                             const std::shared_ptr<Operation>& operation) {
   const Session::Size size = session->GetSize(kMostSmallPoints);
   const uint64_t replayed_steps = operation->restart() ? 0 : size.replayed_steps;
-  const bool is_small = size.points <= kMostSmallPoints && size.segments <= kMostSmallPoints &&
+  const bool is_small = size.points <= kMostSmallPoints && size.segments <= kMostSmallPoints && size.triangles == 0 &&
                         IsSmallRefinement(session->inputs().ParametersOf(operation->parameters()), size.some_points,
                                           size.vertices, replayed_steps);
   WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Job> job,
@@ -264,7 +264,7 @@ void WhenEnded(Operation& operation, const std::function<void()>& then) {
 }
 
 // Operations in whose work one process has died come one after the other: one of them is to blame, and the others are
-// not to pay for it a second time. They may, for what has come meanwhile and runs beside them.
+// not to pay for it a second time. They may, for calls that have come meanwhile and run beside them.
 void ResumeNext(const CallEnvironment& environment, const std::shared_ptr<std::deque<ResumedOperation>>& suspects) {
   if (suspects->empty()) {
     return;

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "core/mesh_parameters.h"
+#include "core/input/mesh_parameters.h"
 #include "server/calls/call_environment.h"
 #include "server/sessions/operation.h"
 #include "server/sessions/session.h"
@@ -15,7 +15,7 @@
 namespace wellspace::server {
 
 // Starts an operation that refines `session` with `parameters`, on a worker: from its points the first time, from then
-// on by what has changed. With `restart` again from its points.
+// on by the changes since the last. With `restart` again from its points.
 //
 // One that does not succeed leaves the session as it was: a mesher that it has changed is given up, and built again by
 // Replay when the structure is next needed.

@@ -71,7 +71,7 @@ absl::StatusOr<std::unique_ptr<core::Mesher>> BeginMesh(const MesherFactory& cre
                                                         const core::MeshParameters& parameters,
                                                         std::span<const double> points, const FeatureStore& features,
                                                         core::RunContext& context) {
-  return create_mesher(parameters, {points, features.View()}, context);
+  return create_mesher(parameters, features.InputOf(points), context);
 }
 
 uint64_t BytesWithVertices(const core::Mesher& mesher, uint64_t count) {

@@ -9,11 +9,11 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "core/base/run_context.h"
-#include "core/mesh_parameters.h"
-#include "core/mesher.h"
+#include "core/input/mesh_parameters.h"
+#include "core/meshers/mesher.h"
 #include "server/base/mesh_functions.h"
+#include "server/inputs/feature_store.h"
 #include "server/jobs/job.h"
-#include "server/sessions/feature_store.h"
 #include "server/sessions/session_inputs.h"
 #include "server/store/mesh_snapshot.h"
 #include "server/store/point_store.h"
@@ -28,7 +28,7 @@ absl::StatusOr<std::unique_ptr<core::Mesher>> BeginMesh(const MesherFactory& cre
                                                         std::span<const double> points, const FeatureStore& features,
                                                         core::RunContext& context);
 
-// What `mesher` takes with `count` more vertices, in all but the most uneven clouds.
+// Memory of `mesher` with `count` more vertices, in bytes, for all but the most uneven clouds.
 //
 // Complexity: O(1).
 uint64_t BytesWithVertices(const core::Mesher& mesher, uint64_t count);
@@ -43,8 +43,8 @@ absl::Status AddPointsTo(core::Mesher& mesher, const PointStore& points, uint64_
 // the mesh of the last refinement among them.
 //
 // REQUIRES:   there are steps; nothing changes the inputs meanwhile.
-// Guarantees: what is made of the mesher from now on is, to the bit, what would have been made of the one that the
-//             steps made.
+// Guarantees: later results of the mesher are, to the bit, those that the first mesher, which the steps were made by,
+//             would have had.
 // Complexity: that of the steps. Reserves memory as the first refinement did.
 // Errors:     those of the steps: RESOURCE_EXHAUSTED, CANCELLED, DEADLINE_EXCEEDED; INTERNAL: the mesh is not
 //             `last_mesh`; DATA_LOSS.

@@ -1,6 +1,5 @@
 #include "server/sessions/session.h"
 
-#include <algorithm>
 #include <utility>
 
 #include "absl/cleanup/cleanup.h"
@@ -12,10 +11,12 @@
 namespace wellspace::server {
 namespace {
 
-// What `state` holds of the limits.
+// The amounts in `state` that count against the limits.
 PointAccount::Held HeldBy(const SessionState& state) {
   PointAccount::Held held{
-      .points = state.record.points(), .segments = state.record.segments(), .seeds = state.record.seeds()};
+      .points = state.record.points(),
+      .features = {
+          .segments = state.record.segments(), .triangles = state.record.triangles(), .seeds = state.record.seeds()}};
   for (const SizesInUse& set : UnusedSizes(state, {}, 0)) {  // all of them
     held.sizes += set.count;
   }
@@ -24,7 +25,7 @@ PointAccount::Held HeldBy(const SessionState& state) {
 
 absl::Duration TtlOf(const SessionState& state) { return absl::Nanoseconds(state.record.ttl_ns()); }
 
-// What a client sees of a session that is in `state`, and keeps `stored_bytes`.
+// The description, for clients, of a session that is in `state`, and keeps `stored_bytes`.
 v1::Session DescriptionOf(const SessionState& state, const Occupancy& occupancy, const Clock& clock,
                           uint64_t stored_bytes) {
   const store::v1::SessionRecord& record = state.record;
@@ -49,6 +50,10 @@ v1::Session DescriptionOf(const SessionState& state, const Occupancy& occupancy,
   if (record.snap_distance() > 0) {
     message.set_snap_distance(record.snap_distance());
   }
+  message.set_triangle_count(record.triangles());
+  if (record.has_surface()) {
+    *message.mutable_surface() = record.surface();
+  }
   message.set_size_count(record.size_count());
   message.set_vertex_count(record.mesh().vertices());
   message.set_simplex_count(record.mesh().simplices());
@@ -59,7 +64,16 @@ v1::Session DescriptionOf(const SessionState& state, const Occupancy& occupancy,
   return message;
 }
 
-// How long memory is reserved for the mesher of a session.
+// The file to which this owner appends points.
+store::v1::PointsFile NextFile(const SessionState& state) {
+  store::v1::PointsFile file;
+  file.set_first(state.record.points());
+  file.set_number(state.record.revision());
+  file.set_epoch(state.epoch);
+  return file;
+}
+
+// The time that memory is reserved for the mesher of a session.
 Lasts LastsIn(const SessionLog& log) { return log.is_durable() ? Lasts::kUntilWanted : Lasts::kSession; }
 
 }  // namespace
@@ -98,36 +112,60 @@ Session::Session(SessionState state, std::vector<store::v1::StepRecord::Points> 
       occupancy_{.lease = Lease(TtlOf(state), clock_.since_boot())},
       account_(name(), dimension(), !log.is_durable(), options, memory, std::move(tenant_points)),
       stores_{.dimension = dimension(),
-              .points = log.OpenPoints(name(), dimension(), state.record.points_file(), std::move(committed))} {
+              .file = NextFile(state),
+              .points = log.files().OpenPoints({.session = name(),
+                                                .dimension = dimension(),
+                                                .files = PointsFilesOf(state.record),
+                                                .committed = std::move(committed),
+                                                .next = NextFile(state)})} {
   PointAccount::Held held = HeldBy(state);
-  stores_.are_loaded = held.segments == 0 && held.seeds == 0 && held.sizes == 0 && !state.record.has_rules();
+  stores_.are_loaded = held.features.all() == 0 && held.sizes == 0 && !state.record.has_rules();
   if (state.record.has_mesh()) {
-    work_.mesh = log_.FindMesh(name(), state.record);
+    work_.mesh = log_.files().FindMesh(state.record);
     held.mesh_bytes = work_.mesh->loaded_bytes();
   }
   account_.Restore(held);
   state_ = std::make_shared<const SessionState>(std::move(state));
 }
 
-// What is shown once the log has the change is made before: nothing is left then that could fail.
-absl::Status Session::Make(const SessionChange& change, absl::FunctionRef<void()> also, SessionLog::Survives survives) {
-  std::shared_ptr<const SessionState> before;
-  bool is_written = log_.is_durable();
-  {
-    absl::MutexLock lock(&mutex_);
-    before = state_;
-    is_written &= !occupancy_.is_closed;
-  }
-  WELLSPACE_ASSIGN_OR_RETURN(SessionState applied, Apply(*before, change));
-  auto after = std::make_shared<const SessionState>(std::move(applied));
-  if (is_written) {
-    WELLSPACE_RETURN_IF_ERROR(log_.Commit(change, survives));
-  }
+// The state to be shown is made before the log has the change: nothing is left then that could fail.
+absl::Status Session::Make(SessionChange& change, absl::FunctionRef<void()> also, AnswerOf answer, Survives survives) {
+  std::shared_ptr<const SessionState> after;
+  WELLSPACE_RETURN_IF_ERROR(RunGuarded([&]() -> absl::Status {
+    change_mutex_.AssertHeld();
+    WELLSPACE_ASSIGN_OR_RETURN(SessionState applied, Apply(*state(), change));
+    after = std::make_shared<const SessionState>(std::move(applied));
+    if (!change.answer.has_value()) {
+      change.answer = answer(*after);
+    }
+    return Commit(change, survives);
+  }));
   absl::MutexLock lock(&mutex_);
   state_ = std::move(after);
   occupancy_.lease.SetTtl(TtlOf(*state_));
   also();
   return absl::OkStatus();
+}
+
+absl::Status Session::Commit(const SessionChange& change, Survives survives) {
+  {
+    absl::MutexLock lock(&mutex_);
+    if (occupancy_.is_elsewhere) {
+      return Elsewhere(name());
+    }
+    if (occupancy_.is_closed) {
+      return absl::OkStatus();
+    }
+  }
+  absl::Status committed = log_.Commit(change, survives);
+  if (!IsOwnedElsewhere(committed)) {
+    return committed;
+  }
+  absl::MutexLock lock(&mutex_);
+  occupancy_.is_elsewhere = true;
+  occupancy_.is_closed = true;
+  account_.Close();
+  return Elsewhere(name());
 }
 
 std::shared_ptr<const SessionState> Session::state() const {
@@ -145,6 +183,11 @@ bool Session::Renew() {
   return !occupancy_.is_closed && occupancy_.lease.Renew(clock_.since_boot());
 }
 
+bool Session::IsElsewhere() const {
+  absl::MutexLock lock(&mutex_);
+  return occupancy_.is_elsewhere;
+}
+
 bool Session::IsExpired() const {
   absl::MutexLock lock(&mutex_);
   return occupancy_.lease.HasExpired(clock_.since_boot());
@@ -154,30 +197,33 @@ absl::Status Session::Update(const std::optional<std::map<std::string, std::stri
                              std::optional<absl::Duration> ttl, uint64_t expected_revision,
                              const AnswerTo<v1::Session>& answer) {
   absl::MutexLock change_lock(&change_mutex_);
-  SessionChange change;
-  v1::Session described;
   {
     absl::MutexLock lock(&mutex_);
     WELLSPACE_RETURN_IF_ERROR(CheckOpen(occupancy_, name()));
     WELLSPACE_RETURN_IF_ERROR(CheckRevision(*state_, stores_.point_count(), expected_revision));
-    change = UpdateChange(*state_, labels, ttl);
-    WELLSPACE_ASSIGN_OR_RETURN(const SessionState after, Apply(*state_, change));
-    described = DescriptionOf(after, occupancy_, clock_, account_.stored_bytes());
   }
-  change.answer = AnswerRecordOf(answer, described);
-  return Make(change, [] {});
+  SessionChange change = UpdateChange(*state(), labels, ttl);
+  return Make(
+      change, [] {},
+      [&](const SessionState& after) {
+        v1::Session described;
+        {
+          absl::MutexLock lock(&mutex_);
+          described = DescriptionOf(after, occupancy_, clock_, account_.stored_bytes());
+        }
+        return AnswerRecordOf(answer, described);
+      });
 }
 
 absl::StatusOr<std::shared_ptr<Operation>> Session::Close(uint64_t expected_revision,
                                                           const std::optional<store::v1::AnswerRecord>& answer) {
   absl::MutexLock change_lock(&change_mutex_);
-  SessionChange change;
   {
     absl::MutexLock lock(&mutex_);
     WELLSPACE_RETURN_IF_ERROR(CheckOpen(occupancy_, name()));
     WELLSPACE_RETURN_IF_ERROR(CheckRevision(*state_, stores_.point_count(), expected_revision));
-    change = DeletionChange(*state_);
   }
+  SessionChange change = DeletionChange(*state());
   change.answer = answer;
   std::shared_ptr<Operation> under_way;
   WELLSPACE_RETURN_IF_ERROR(Make(change, [&] {
@@ -186,12 +232,14 @@ absl::StatusOr<std::shared_ptr<Operation>> Session::Close(uint64_t expected_revi
     account_.Close();
     under_way = occupancy_.busy == Busy::kOperation ? operations_.back() : nullptr;
   }));
+  DropUnnamed();
   return under_way;
 }
 
 bool Session::CloseIfExpired() {
   absl::MutexLock lock(&mutex_);
-  if (occupancy_.is_closed || !occupancy_.lease.HasExpired(clock_.since_boot())) {
+  const bool was_closed = occupancy_.is_closed && !occupancy_.is_elsewhere;
+  if (was_closed || !occupancy_.lease.HasExpired(clock_.since_boot())) {
     return false;
   }
   occupancy_.is_closed = true;
@@ -201,7 +249,18 @@ bool Session::CloseIfExpired() {
 
 absl::Status Session::LogExpiry() {
   absl::MutexLock change_lock(&change_mutex_);
-  return log_.is_durable() ? log_.Commit(DeletionChange(*state())) : absl::OkStatus();
+  WELLSPACE_RETURN_IF_ERROR(log_.Commit(DeletionChange(*state())));
+  DropUnnamed();
+  return absl::OkStatus();
+}
+
+void Session::DropUnnamed() {
+  store::v1::PointsFile file;
+  {
+    absl::MutexLock lock(&mutex_);
+    file = stores_.file;
+  }
+  log_.files().DropPoints(name(), file);
 }
 
 absl::Status Session::LoadInputs() {
@@ -215,14 +274,11 @@ absl::Status Session::LoadInputs() {
     WELLSPACE_RETURN_IF_ERROR(CheckOpen(occupancy_, name()));
     wanted = UnusedSizes(*state_, {}, 0);  // all of them
   }
-  WELLSPACE_ASSIGN_OR_RETURN(SizeSets sizes, ReadSizeSets(log_, name(), wanted));
-  WELLSPACE_ASSIGN_OR_RETURN(const std::vector<store::v1::StepRecord::Features> steps, log_.ReadFeatures(name()));
+  WELLSPACE_ASSIGN_OR_RETURN(SizeSets sizes, ReadSizeSets(log_.records(), name(), wanted));
+  WELLSPACE_ASSIGN_OR_RETURN(const std::vector<FeaturePart> parts, log_.records().ReadFeatures(name()));
   const auto features = std::make_shared<FeatureStore>();
-  for (const store::v1::StepRecord::Features& step : steps) {
-    features->Append(step.segments());
-    if (step.has_faces()) {
-      features->Append(step.faces());
-    }
+  for (const FeaturePart& part : parts) {
+    features->Append(part);
   }
   absl::MutexLock lock(&mutex_);
   stores_.features = features;
@@ -248,14 +304,16 @@ std::shared_ptr<const MeshSnapshot> Session::mesh() const {
 absl::StatusOr<std::shared_ptr<MeshSnapshot>> Session::KeepMesh(core::Mesh mesh,
                                                                 const core::RunContext& context) const {
   uint64_t revision = 0;
+  uint64_t epoch = 0;
   {
     // Before it is written anywhere. EndWork takes it into the account.
     absl::MutexLock lock(&mutex_);
     WELLSPACE_RETURN_IF_ERROR(
         account_.CheckMesh(MeshSnapshot::LoadedBytes(dimension(), mesh.vertex_count(), mesh.simplex_count())));
     revision = NextRevision(*state_);
+    epoch = state_->epoch;
   }
-  return log_.KeepMesh(name(), revision, std::move(mesh), context);
+  return log_.files().KeepMesh(name(), revision, epoch, std::move(mesh), context);
 }
 
 absl::Status Session::Query(uint64_t* version, const std::function<absl::Status(const core::Mesher&)>& query) const {

@@ -18,14 +18,14 @@
 #include "absl/status/statusor.h"
 #include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "server/base/clock.h"
 #include "server/base/mesh_functions.h"
 #include "server/base/options.h"
+#include "server/inputs/feature_store.h"
 #include "server/jobs/job.h"
 #include "server/jobs/memory_budget.h"
 #include "server/sessions/answer_to.h"
-#include "server/sessions/feature_store.h"
 #include "server/sessions/mesh_deltas.h"
 #include "server/sessions/occupancy.h"
 #include "server/sessions/operation.h"
@@ -43,40 +43,40 @@
 
 namespace wellspace::server {
 
-// What AddVertices did.
+// The result of AddVertices.
 struct AddedVertices {
   std::vector<uint32_t> vertices;  // by point
   uint64_t revision = 0;           // of the session
 };
 
-// What a session has after points were removed.
+// The result of RemovePoints.
 struct PointsLeft {
   uint64_t points = 0;
   uint64_t revision = 0;  // of the session
 };
 
-// A session in the process that has it: its state, which is a value (session_state.h), and what the process holds
+// A session in the process that has it: its state, which is a value (session_state.h), and the process's own data
 // beside it: stores of points, features and sizes, the mesher, the last mesh, live operations, and who is at work
 // (occupancy.h).
 //
-// A change is made by a pure function of the state and of what is asked for (session_changes.h); Make applies it, has
+// A change is made by a pure function of the state and of the request (session_changes.h); Make applies it, has
 // the log commit it, and shows the state after it. Functions are in several files:
 //
-//   session.cc             what clients see, labels, lease and end; queries; the mesher that is given up; Make
-//   session_points.cc      uploads                           session_features.cc    segments, seeds, rules of faces
+//   session.cc             description, labels, lease and end; queries; the mesher that is given up; Make
+//   session_points.cc      uploads                           session_features.cc    features
 //   session_removal.cc     points that are taken out         session_operations.cc  operations
 //   session_sizes.cc       sizes at points                   session_structure.cc   the mesher that is built again,
 //                                                            vertices that are added, the locator
 //
-// States, and what changes them: docs/design/sessions.md, "States".
+// States, and their changes: docs/design/sessions.md, "States".
 //
 // Thread safety: thread-safe. Functions that change the session wait for the log: they are to be called where that
 //                holds up no other work.
-// Invariants: (1) the state is Apply of what the log has; (2) while the session is busy, points, features, sizes, mesh,
-// mesher and steps are touched by the work alone that has made it so; (3) what did not succeed leaves the session as it
-// was: structure and mesh are what Replay makes of the steps, whether there is a mesher now or not; (4) no client is
-// told of a change, and nothing shows it, before the log has it; one that it cannot have is not made. An expiry, and
-// what becomes of an operation, show even where it cannot have them.
+// Invariants: (1) the state is Apply of the whole log; (2) while the session is busy, only the work that made it so
+//             touches points, features, sizes, mesh, mesher and steps; (3) a failed change leaves the session as it
+//             was: structure and mesh are as Replay makes them of the steps, with or without a mesher; (4) no client is
+//             told of a change, and nothing shows it, before the log has it; a change that it cannot have is not made.
+//             An expiry and the end of an operation show even where it cannot have them.
 class Session {
  public:
   // A session that is written down as `stored`: without mesher, its files not looked at yet. Its lease begins now. An
@@ -90,24 +90,26 @@ class Session {
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
-  // ---- What clients see, labels, lease and end: session.cc ----
+  // ---- Description, labels, lease and end: session.cc ----
 
   const std::string& tenant() const { return identity_.tenant; }
   const std::string& name() const { return identity_.name; }
   int dimension() const { return identity_.dimension; }
   absl::Time create_time() const { return identity_.create_time; }
-  // The state as it is now. It stays what it is.
+  // The state as it is now: a value, which does not change.
   std::shared_ptr<const SessionState> state() const;
   v1::Session Describe() const;
 
   // Renews the lease; false when it has run out already.
   bool Renew();
+  // Whether another server has taken the session over, so that this one has nothing to say of it.
+  bool IsElsewhere() const;
   // A session with a SessionUse, or with an operation under way, does not expire.
   bool IsExpired() const;
 
-  // Changes what is given.
+  // Changes the given properties.
   //
-  // Errors:     REVISION_MISMATCH, SESSION_NOT_FOUND. Of this and all other changes, besides what is named there:
+  // Errors:     REVISION_MISMATCH, SESSION_NOT_FOUND. Of this and all other changes, besides those named there:
   //             DISK_FULL, STORE_FAILED.
   absl::Status Update(const std::optional<std::map<std::string, std::string>>& labels,
                       std::optional<absl::Duration> ttl, uint64_t expected_revision,
@@ -119,7 +121,8 @@ class Session {
   // Errors:     REVISION_MISMATCH, SESSION_NOT_FOUND (it was closed before): nothing has been done.
   absl::StatusOr<std::shared_ptr<Operation>> Close(uint64_t expected_revision,
                                                    const std::optional<store::v1::AnswerRecord>& answer = std::nullopt);
-  // Closes the session if its lease has run out, so that nothing is under way. Says whether it has.
+  // Closes the session if its lease has run out, so that nothing is under way. Says whether it has; also of a session
+  // that another server has taken over, whose place here is free then.
   bool CloseIfExpired();
 
   // Writes down that a session which was closed by its lease is no more. Should that fail, it is there again after the
@@ -130,7 +133,7 @@ class Session {
 
   // ---- Uploads: session_points.cc ----
 
-  // What a client believes that the session has.
+  // A range of points that a client believes the session to have, with their checksum.
   struct Prefix {
     uint64_t first = 0;  // points
     uint64_t end = 0;    // points; first <= end
@@ -165,20 +168,20 @@ class Session {
   absl::StatusOr<PointsLeft> RemovePoints(std::span<const uint64_t> numbers, uint64_t expected_revision,
                                           const AnswerTo<PointsLeft>& answer = nullptr);
 
-  // ---- Segments, seeds and rules of faces: session_features.cc ----
+  // ---- Segments or triangles, seeds and rules: session_features.cc ----
 
-  // Appends the segments and seeds of `request`, of which the first become those of the numbers that it says, and takes
-  // over its rules: all or, on an error, none. Where the session has segments and seeds already, they have to be equal,
-  // and are not appended again. `expected_revision` 0: any.
+  // Appends the features and seeds of `part`, of which the first become those of the numbers `offset`, and takes over
+  // its rules: all or, on an error, none. Where the session has features and seeds already, they have to be equal, and
+  // are not appended again. `expected_revision` 0: any.
   //
-  // Errors:     INVALID_SEGMENTS, INVALID_CHUNK_SHAPE, UPLOAD_GAP, UPLOAD_MISMATCH, DOMAIN_FIXED, SESSION_BUSY,
-  //             TOO_MANY_POINTS, QUOTA_EXCEEDED, MEMORY_LIMIT, REVISION_MISMATCH, SESSION_NOT_FOUND.
-  absl::Status AddSegments(const v1::AddSegmentsRequest& request, uint64_t expected_revision);
+  // Errors:     INVALID_SEGMENTS, INVALID_TRIANGLES, INVALID_CHUNK_SHAPE, UPLOAD_GAP, UPLOAD_MISMATCH, DOMAIN_FIXED,
+  //             SESSION_BUSY, TOO_MANY_POINTS, QUOTA_EXCEEDED, MEMORY_LIMIT, REVISION_MISMATCH, SESSION_NOT_FOUND.
+  absl::Status AddFeatures(const FeaturePart& part, const FeatureCounts& offset, uint64_t expected_revision);
 
   // ---- Sizes at points: session_sizes.cc ----
 
   // Replaces the sizes at points that the next refinements keep to; null for none. `expected_revision` 0: any.
-  // `received`, if not null, is what was reserved for them so far: it is given back as far as the session reserves it.
+  // `received`, if not null, is the memory reserved for them: it is given back as far as the session reserves it.
   //
   // REQUIRES:   `samples` has passed CheckSizes.
   // Complexity: O(samples).
@@ -187,11 +190,11 @@ class Session {
   absl::Status SetSizes(const std::shared_ptr<const core::SizeSamples>& samples, uint64_t expected_revision,
                         MemoryReservation* received = nullptr);
 
-  // ---- Mesh and queries, and what is given up for other work: session.cc ----
+  // ---- Mesh and queries, and memory that is given up for other work: session.cc ----
 
   // The last mesh; null before the first.
   std::shared_ptr<const MeshSnapshot> mesh() const;
-  // What is known of how it came from the meshes before.
+  // The differences that are known between the last mesh and those before.
   MeshDeltas& deltas() const { return deltas_; }
   // Runs `query` on this thread, a worker's. Any number of queries run at once. An operation that begins waits for the
   // queries that run: keep each short (some milliseconds), and call this again for the next batch.
@@ -201,7 +204,7 @@ class Session {
   //             `version`; those of `query`.
   absl::Status Query(uint64_t* version, const std::function<absl::Status(const core::Mesher&)>& query) const;
 
-  // What of the session's memory other work may have.
+  // The memory that the session can give up for other work.
   struct Spare {
     uint64_t bytes = 0;                              // that GiveUpMesher frees
     absl::Duration last_use = absl::ZeroDuration();  // since boot
@@ -210,7 +213,7 @@ class Session {
   std::optional<Spare> GetSpare() const;
   // To be called, without a lock, where the session was busy, or its structure or its locator in use: it may be spared.
   void NoteIdle() const;
-  // Gives the mesher up for other work, what points are located by, and the differences of meshes. The first two come
+  // Gives the mesher up for other work, the locator, and the differences of meshes. The first two come
   // back as PrepareStructure, PrepareLocator and operations say. Returns how much memory that has freed: 0, and nothing
   // is done, where there is nothing to spare.
   //
@@ -244,10 +247,11 @@ class Session {
   // Errors:     MESH_NOT_READY, REVISION_MISMATCH, SESSION_NOT_FOUND; of making it: MEMORY_LIMIT, CANCELLED, DATA_LOSS.
   absl::StatusOr<std::shared_ptr<const LocatedMesh>> PrepareLocator(uint64_t revision, Job& job);
 
-  // How much there is to work on now.
+  // The size of the inputs that there are to work on.
   struct Size {
     uint64_t points = 0;
     uint64_t segments = 0;
+    uint64_t triangles = 0;
     std::vector<double> some_points;  // all, if they are at most `few`; else none
     uint64_t vertices = 0;            // of the last mesh
     uint64_t replayed_steps = 0;  // that have to be replayed before other work than one that begins a structure anew
@@ -257,25 +261,25 @@ class Session {
 
   // ---- Operations: session_operations.cc ----
 
-  // For a session that was restored: writes down what the new process has changed of its operation, and returns it, for
+  // For a session that was restored: writes down the new process's change of its operation, and returns it, for
   // its work to be done; or null, if none was under way.
   absl::StatusOr<std::shared_ptr<Operation>> ResumeOperation();
   // Begins an operation. The session is busy until the operation has ended. `submit` is called with it, without any
-  // lock, to submit its work; what it refuses is not begun. With `restart` the structure is made anew, in the same box.
+  // lock, to submit its work; refused work is not begun. With `restart` the structure is made anew, in the same box.
   //
-  // Errors:     SESSION_BUSY, REVISION_MISMATCH, SESSION_NOT_FOUND; INVALID_PARAMETERS, of those that a domain with
-  //             segments does not have; STORAGE_QUOTA_EXCEEDED, where there is no byte left for a first mesh; those
+  // Errors:     SESSION_BUSY, REVISION_MISMATCH, SESSION_NOT_FOUND; INVALID_PARAMETERS, of those that such a
+  //             domain does not have; STORAGE_QUOTA_EXCEEDED, where there is no byte left for a first mesh; those
   //             of `submit`. Of a log that fails, and of a session that is closed meanwhile, `submit` was called, and
   //             the operation has ended without a trace.
   using SubmitWork = std::function<absl::Status(const std::shared_ptr<Operation>&)>;
   absl::StatusOr<std::shared_ptr<Operation>> StartOperation(core::MeshParameters parameters, bool restart,
                                                             uint64_t expected_revision, const SubmitWork& submit,
                                                             const AnswerTo<v1::Operation>& answer = nullptr);
-  // On the worker: what to work on; nothing if the operation has ended before it could begin.
+  // On the worker: the data to work on; nothing if the operation has ended before it could begin.
   //
   // REQUIRES:   the operation has its job.
   std::optional<SessionWork> BeginWork(Operation& operation);
-  // Takes back what BeginWork gave, and ends the operation. One whose job was cancelled while no client has asked for
+  // Takes back the work of BeginWork, and ends the operation. One whose job was cancelled while no client has asked for
   // it, and which the log keeps, is not ended: the next process goes on with it.
   //
   // False:      the log has no room for the end, and nothing is done but that a `result` that was OK is an error now.
@@ -291,11 +295,11 @@ class Session {
   // The operations after number `after`, the oldest first, at most `count`.
   std::vector<std::shared_ptr<Operation>> ListOperations(uint64_t after, size_t count) const;
 
-  // What the work that has made the session busy computes from.
+  // The inputs of the work that has made the session busy.
   SessionInputs inputs() const;
   // Keeps `mesh`, the work of an operation that is under way, as the log keeps meshes.
   //
-  // Errors:     those of SessionLog::KeepMesh; STORAGE_QUOTA_EXCEEDED.
+  // Errors:     those of Files::KeepMesh; STORAGE_QUOTA_EXCEEDED.
   absl::StatusOr<std::shared_ptr<MeshSnapshot>> KeepMesh(core::Mesh mesh, const core::RunContext& context) const;
 
  private:
@@ -305,16 +309,17 @@ class Session {
   friend class PointRemoval;
   friend class VertexAddition;
 
-  // What never changes.
+  // The constants of a session.
   struct Identity {
     std::string tenant;
     std::string name;  // "sessions/{session}"
     int dimension = 0;
     absl::Time create_time;
   };
-  // What clients have sent.
+  // The data that clients have sent.
   struct Stores {
     int dimension = 0;
+    store::v1::PointsFile file;  // where points are appended
     std::shared_ptr<PointStore> points;
     uint32_t new_crc32c = 0;  // of the points behind those of the state, which are not committed
     std::shared_ptr<FeatureStore> features = std::make_shared<FeatureStore>();
@@ -323,24 +328,35 @@ class Session {
 
     // Points that are committed, and that are not.
     uint64_t point_count() const { return points->coordinate_count() / dimension; }
-    AppendedPoints appended() const { return {.end = point_count(), .crc32c = new_crc32c}; }
+    AppendedPoints appended() const { return {.end = point_count(), .crc32c = new_crc32c, .file = file}; }
   };
+
+  // The answer to the request that has asked for a change, made of the state after it. It is written down with the
+  // change; none where the request has no id.
+  using AnswerOf = absl::FunctionRef<std::optional<store::v1::AnswerRecord>(const SessionState& after)>;
+  static std::optional<store::v1::AnswerRecord> NoAnswer(const SessionState& /*after*/) { return std::nullopt; }
 
   Session(SessionState state, std::vector<store::v1::StepRecord::Points> committed, const ServiceOptions& options,
           MemoryBudget& memory, Clock clock, std::shared_ptr<TenantPoints> tenant_points, SessionLog& log);
 
-  // Makes `change`: has the log commit it, if that keeps anything and the session is not closed, and shows the state
-  // after it. `also` is called with mutex_ held, when the state is shown: what the process holds changes with it.
+  // Makes `change`: has the log commit it, if the session is not closed, and shows the state after it. `also` is called
+  // with mutex_ held, when the state is shown, to change the process's own members. `answer`, if the change has none
+  // yet, makes it of the state after it, and is called without mutex_.
   //
-  // Errors:     those of SessionLog::Commit, and an exception when memory ends: nothing has changed.
-  absl::Status Make(const SessionChange& change, absl::FunctionRef<void()> also,
-                    SessionLog::Survives survives = SessionLog::Survives::kPowerLoss)
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_);
-  // Reads segments, seeds and sizes that were written down by another process, if that was not done yet. Whatever looks
+  // Errors:     as of SessionLog::Commit, OUT_OF_MEMORY: nothing has changed. SESSION_ELSEWHERE: another server has
+  //             the session, and from now on it is closed here.
+  absl::Status Make(SessionChange& change, absl::FunctionRef<void()> also, AnswerOf answer = NoAnswer,
+                    Survives survives = Survives::kPowerLoss) ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_);
+  // The part of Make that writes it down. Nothing is of a session that is closed.
+  absl::Status Commit(const SessionChange& change, Survives survives) ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_);
+  // Reads features and sizes that were written down by another process, if that was not done yet. Whatever looks
   // at them calls this first, without mutex_, since it reads files.
   //
   // Errors:     SESSION_NOT_FOUND, DATA_LOSS.
   absl::Status LoadInputs() ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_) ABSL_LOCKS_EXCLUDED(mutex_);
+
+  // Of a session that was deleted: the points file that has only uncommitted points goes, too.
+  void DropUnnamed() ABSL_LOCKS_EXCLUDED(mutex_);
 
   // The parts of StartOperation and EndWork that commit.
   absl::Status CommitStart(const std::shared_ptr<Operation>& operation, const AnswerTo<v1::Operation>& answer)
@@ -352,20 +368,20 @@ class Session {
   const Clock clock_;
   SessionLog& log_;
 
-  // Two locks, in their order. What others take before, between and after: docs/design/sessions.md, "Locks".
+  // Two locks, in their order. Locks that others take before, between and after: docs/design/sessions.md, "Locks".
   //
   // The first is the turn of changes: who holds it alone replaces the state, and may do so after a commit. The second
   // guards all that others see; it is never held over meshing, or over a commit.
   mutable absl::Mutex change_mutex_ ABSL_ACQUIRED_BEFORE(mutex_);
   mutable absl::Mutex mutex_;
-  // These have locks of their own. No one holds change_mutex_ and wants the first.
+  // These have locks of their own. No thread holds change_mutex_ and wants the first.
   SessionLocator locator_;
   mutable MeshDeltas deltas_;
 
   // Never null; written with both locks held, by Make alone.
   std::shared_ptr<const SessionState> state_ ABSL_GUARDED_BY(mutex_);
   mutable Occupancy occupancy_ ABSL_GUARDED_BY(mutex_);  // queries come and go
-  PointAccount account_ ABSL_GUARDED_BY(mutex_);         // what is paid for, vertices that are being added included
+  PointAccount account_ ABSL_GUARDED_BY(mutex_);         // of points and bytes, vertices that are being added included
   Stores stores_ ABSL_GUARDED_BY(mutex_);     // the work that has made the session busy reads them by inputs()
   SessionWork work_ ABSL_GUARDED_BY(mutex_);  // its mesher is away while work has the session
   std::deque<std::shared_ptr<Operation>> operations_ ABSL_GUARDED_BY(mutex_);  // those of the state, alive

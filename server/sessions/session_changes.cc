@@ -1,9 +1,10 @@
 #include "server/sessions/session_changes.h"
 
 #include <utility>
+#include <vector>
 
-#include "core/meshing_version.h"
-#include "server/sessions/size_store.h"
+#include "core/meshers/meshing_version.h"
+#include "server/inputs/size_store.h"
 #include "server/wire/convert.h"
 
 namespace wellspace::server {
@@ -14,18 +15,32 @@ using store::v1::SessionRecord;
 using store::v1::StepRecord;
 
 // A change that leaves the record as it is.
-SessionChange EmptyChange(const SessionState& state) { return {.session = state.name()}; }
+SessionChange EmptyChange(const SessionState& state) { return {.session = state.name(), .epoch = state.epoch}; }
 
 // A change that has the record, which the caller makes another.
-SessionChange RecordChange(const SessionState& state) { return {.session = state.name(), .state = state.record}; }
+SessionChange RecordChange(const SessionState& state) {
+  SessionChange change = EmptyChange(state);
+  change.state = state.record;
+  return change;
+}
 
 // The record is that of the next revision.
 void Revise(SessionRecord& record) { record.set_revision(record.revision() + 1); }
+
+bool AreSame(const store::v1::PointsFile& a, const store::v1::PointsFile& b) {
+  return a.number() == b.number() && a.epoch() == b.epoch();
+}
 
 void AppendPoints(const AppendedPoints& appended, SessionChange& change) {
   SessionRecord& record = *change.state;
   if (appended.end <= record.points()) {
     return;
+  }
+  std::vector<store::v1::PointsFile> files = PointsFilesOf(record);
+  if (files.empty() || !AreSame(files.back(), appended.file)) {
+    files.push_back(appended.file);
+    files.back().set_first(record.points());
+    record.mutable_points_files()->Assign(files.begin(), files.end());
   }
   StepRecord::Points& points = *change.steps.emplace_back().mutable_points();
   points.set_first(record.points());
@@ -55,7 +70,7 @@ SessionChange CreationChange(const SessionSettings& settings) {
   record.set_ttl_ns(absl::ToInt64Nanoseconds(settings.ttl));
   record.set_revision(1);
   record.set_next_operation(1);
-  return {.session = settings.name, .state = std::move(record)};
+  return {.session = settings.name, .epoch = settings.epoch, .is_creation = true, .state = std::move(record)};
 }
 
 SessionChange UpdateChange(const SessionState& state, const std::optional<std::map<std::string, std::string>>& labels,
@@ -92,29 +107,23 @@ SessionChange RemovalChange(const SessionState& state, const PointsThatAreLeft& 
     points.set_crc32c(left.crc32c);
   }
   change.state->set_points(left.points);
-  change.state->set_points_file(left.file);
-  change.state->set_revision(left.file);
+  change.state->set_points_file(left.file.number());
+  change.state->clear_points_files();
+  if (left.points > 0) {
+    *change.state->add_points_files() = left.file;
+  }
+  change.state->set_revision(left.file.number());
   change.state->set_is_ready(false);
   DropSizesOfSteps(state, change);
   return change;
 }
 
-SessionChange FeaturesChange(const SessionState& state, const v1::AddSegmentsRequest& request, uint64_t known_segments,
-                             uint64_t known_seeds, const FeatureSummary& after) {
+SessionChange FeaturesChange(const SessionState& state, const FeaturePart& part, const FeatureCounts& known,
+                             const FeatureSummary& after) {
   SessionChange change = RecordChange(state);
-  StepRecord::Features& step = *change.steps.emplace_back().mutable_features();
-  *step.mutable_segments() = request.segments();
-  step.mutable_segments()->mutable_ends()->ExtractSubrange(0, static_cast<int>(2 * known_segments), nullptr);
-  if (request.segments().markers_size() != 0) {
-    step.mutable_segments()->mutable_markers()->ExtractSubrange(0, static_cast<int>(known_segments), nullptr);
-  }
-  if (request.segments().groups_size() != 0) {
-    step.mutable_segments()->mutable_groups()->ExtractSubrange(0, static_cast<int>(known_segments), nullptr);
-  }
-  if (request.has_faces()) {
-    *step.mutable_faces() = request.faces();
-    step.mutable_faces()->mutable_seeds()->DeleteSubrange(0, static_cast<int>(known_seeds));
-  }
+  FeaturePart& step = *change.steps.emplace_back().mutable_features();
+  step = part;
+  DropKnown(known, step);
   SetFeatures(after, *change.state);
   Revise(*change.state);
   return change;
@@ -188,20 +197,6 @@ SessionChange SuccessChange(const SessionState& state, const OperationRecord& op
   }
   change.operations.push_back(operation);
   return change;
-}
-
-store::v1::MeshRecord RecordOf(const MeshSnapshot& mesh) {
-  if (std::optional<store::v1::MeshRecord> record = mesh.record()) {
-    return *std::move(record);
-  }
-  const MeshSnapshot::Figures& figures = mesh.figures();
-  store::v1::MeshRecord record;
-  record.set_revision(figures.revision);
-  record.set_vertices(figures.vertices);
-  record.set_simplices(figures.simplices);
-  record.mutable_domain_low()->Assign(figures.domain_low.begin(), figures.domain_low.end());
-  record.mutable_domain_high()->Assign(figures.domain_high.begin(), figures.domain_high.end());
-  return record;
 }
 
 SessionChange AdditionChange(const SessionState& state, const AppendedPoints& appended, uint64_t uploads_end,

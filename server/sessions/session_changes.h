@@ -1,4 +1,4 @@
-// The changes of a session: what each writes down, made of the state before.
+// The changes of a session: the records that each writes, made of the state before.
 #ifndef WELLSPACE_SERVER_SESSIONS_SESSION_CHANGES_H_
 #define WELLSPACE_SERVER_SESSIONS_SESSION_CHANGES_H_
 
@@ -11,25 +11,23 @@
 
 #include "absl/time/time.h"
 #include "core/geometry/criterion.h"
-#include "core/mesh_parameters.h"
-#include "server/sessions/feature_store.h"
+#include "core/input/mesh_parameters.h"
+#include "server/inputs/feature_store.h"
 #include "server/sessions/session_state.h"
-#include "server/store/mesh_snapshot.h"
-#include "server/store/session_log.h"
+#include "server/store/records.h"
 #include "wellspace/store/v1/records.pb.h"
-#include "wellspace/v1/sessions.pb.h"
 
 namespace wellspace::server {
 
-// Each function here is one transition: of the state before and of what is asked for it makes the change that is
-// committed. Apply (server/sessions/session_state.h) says what the state is then. None of them looks at anything else,
+// Each function here is one transition: of the state before and of the request it makes the change that is
+// committed. Apply (server/sessions/session_state.h) makes the state after it. None of them looks at anything else,
 // so that they can be tested, and committed by any process that owns the session.
 //
-// Complexity: O(size of the record), and of what comes. Errors: none, if not said otherwise.
+// Complexity: O(size of the record), and of the data. Errors: none, if not said otherwise.
 
 constexpr size_t kKeptOperations = 100;
 
-// Settings of a session that nobody knows yet.
+// Settings of a session that has not been shown yet.
 struct SessionSettings {
   std::string tenant;
   std::string name;  // "sessions/{session}"
@@ -37,6 +35,7 @@ struct SessionSettings {
   std::map<std::string, std::string> labels;
   absl::Duration ttl;
   absl::Time create_time;
+  uint64_t epoch = 0;  // of its owner
 };
 SessionChange CreationChange(const SessionSettings& settings);
 
@@ -49,25 +48,25 @@ SessionChange DeletionChange(const SessionState& state);
 
 // Points that were appended behind those that the session has.
 struct AppendedPoints {
-  uint64_t end = 0;     // how many the session has with them
-  uint32_t crc32c = 0;  // of those that are new
+  uint64_t end = 0;              // how many the session has with them
+  uint32_t crc32c = 0;           // of those that are new
+  store::v1::PointsFile file{};  // where those that are new lie
 };
 
 // `appended` are the session's. Nothing changes where none are new: the change has no record then.
 SessionChange PointsChange(const SessionState& state, const AppendedPoints& appended);
 
-// The session has `left` points, in a file of this number, whose checksum is `crc32c`, and no structure.
+// The session has `left` points, in this file, whose checksum is `crc32c`, and no structure.
 struct PointsThatAreLeft {
   uint64_t points = 0;
-  uint64_t file = 0;  // its number: the revision after the change
+  store::v1::PointsFile file{};  // its number is the revision after the change
   uint32_t crc32c = 0;
 };
 SessionChange RemovalChange(const SessionState& state, const PointsThatAreLeft& left);
 
-// What is new of `request`, all but its first `known_segments` and `known_seeds`, comes behind; `after` is what the
-// session has then.
-SessionChange FeaturesChange(const SessionState& state, const v1::AddSegmentsRequest& request, uint64_t known_segments,
-                             uint64_t known_seeds, const FeatureSummary& after);
+// Appends the new rows of `part`, all but its first `known` of each kind; `after` is the summary of all of them.
+SessionChange FeaturesChange(const SessionState& state, const FeaturePart& part, const FeatureCounts& known,
+                             const FeatureSummary& after);
 
 // Whether the session has `expected` where the same sizes are set once more. A client whose answer was lost repeats the
 // call, with the revision that was right the first time.
@@ -75,7 +74,7 @@ bool IsRevisionOfSizes(const SessionState& state, uint64_t expected);
 // `samples`, null for none, take the place of the sizes before. Sets that no step needs are dropped.
 SessionChange SizesChange(const SessionState& state, const std::shared_ptr<const core::SizeSamples>& samples);
 
-// An operation that is new: its record, and the change that it begins with. It takes what was appended.
+// An operation that is new: its record, and the change that it begins with. It takes the appended points.
 store::v1::OperationRecord NewOperation(const SessionState& state, const core::MeshParameters& parameters, bool restart,
                                         absl::Time now);
 SessionChange StartChange(const SessionState& state, const store::v1::OperationRecord& operation,
@@ -87,8 +86,6 @@ SessionChange OperationChange(const SessionState& state, const store::v1::Operat
 // An operation that has succeeded, as `operation` says, with the mesh of this record: all points are meshed.
 SessionChange SuccessChange(const SessionState& state, const store::v1::OperationRecord& operation,
                             const store::v1::MeshRecord& mesh);
-// What names `mesh` in a state. One that is in memory alone has its figures there.
-store::v1::MeshRecord RecordOf(const MeshSnapshot& mesh);
 
 // `count` vertices were added at the last of the points that were `appended`, after all before were taken in up to
 // number `uploads_end`.

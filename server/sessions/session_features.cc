@@ -1,4 +1,4 @@
-// What a session does with segments, seeds and the rules of faces.
+// Methods of Session about the features that bound its domain: segments or triangles, seeds and rules.
 #include <algorithm>
 
 #include "absl/strings/str_cat.h"
@@ -9,7 +9,7 @@
 namespace wellspace::server {
 namespace {
 
-// Where a request goes on with one kind of thing.
+// The place at which a request goes on with one kind of feature.
 struct Place {
   const char* what;          // of several
   const char* offset_field;  // of the request
@@ -40,82 +40,71 @@ absl::Status CheckEqual(const Place& place, uint64_t equal, const std::string& s
                          place.field);
 }
 
-// Refuses a request whose segments or seeds leave a gap, or are others than `features` of `session` have. `*segments`
-// and `*seeds` become how many of them it has already.
-absl::Status CheckRepeatedFeatures(const v1::AddSegmentsRequest& request, const FeatureStore& features,
-                                   const std::string& session, uint64_t* segments, uint64_t* seeds) {
-  const Place segment_place{.what = "segments",
-                            .offset_field = "segment_offset",
-                            .field = "segments.ends",
-                            .offset = request.segment_offset(),
-                            .count = static_cast<uint64_t>(request.segments().ends_size()) / 2,
-                            .committed = features.segment_count()};
-  const Place seed_place{.what = "seeds",
-                         .offset_field = "seed_offset",
-                         .field = "faces.seeds",
-                         .offset = request.seed_offset(),
-                         .count = static_cast<uint64_t>(request.faces().seeds_size()),
-                         .committed = features.seed_count()};
-  WELLSPACE_RETURN_IF_ERROR(CheckPlace(segment_place, session));
-  WELLSPACE_RETURN_IF_ERROR(CheckPlace(seed_place, session));
-  *segments = segment_place.known();
-  *seeds = seed_place.known();
-  WELLSPACE_RETURN_IF_ERROR(
-      CheckEqual(segment_place, features.CountEqual(segment_place.offset, *segments, request.segments()), session));
-  return CheckEqual(seed_place, features.CountEqual(seed_place.offset, *seeds, request.faces()), session);
+// Refuses features whose numbers begin with `offset` and leave a gap, or which are others than `features` of `session`
+// are. `*known` becomes how many of them it has already.
+absl::Status CheckRepeated(const FeaturePart& part, const FeatureCounts& offset, const FeatureStore& features,
+                           const std::string& session, FeatureCounts* known) {
+  const FeatureCounts count = CountsOf(part);
+  const FeatureCounts committed = features.counts();
+  const Place segments{"segments",      "segment_offset", "segments.ends",
+                       offset.segments, count.segments,   committed.segments};
+  const Place triangles{"triangles",      "triangle_offset", "triangles.corners",
+                        offset.triangles, count.triangles,   committed.triangles};
+  const Place seeds{"seeds",      "seed_offset", part.has_surface() ? "surface.seeds" : "faces.seeds",
+                    offset.seeds, count.seeds,   committed.seeds};
+  for (const Place& place : {segments, triangles, seeds}) {
+    WELLSPACE_RETURN_IF_ERROR(CheckPlace(place, session));
+  }
+  *known = {.segments = segments.known(), .triangles = triangles.known(), .seeds = seeds.known()};
+  const FeatureCounts equal = features.CountEqual(offset, *known, part);
+  WELLSPACE_RETURN_IF_ERROR(CheckEqual(segments, equal.segments, session));
+  WELLSPACE_RETURN_IF_ERROR(CheckEqual(triangles, equal.triangles, session));
+  return CheckEqual(seeds, equal.seeds, session);
 }
 
 }  // namespace
 
-absl::Status Session::AddSegments(const v1::AddSegmentsRequest& request, uint64_t expected_revision) {
-  WELLSPACE_RETURN_IF_ERROR(CheckSegments(request.segments(), request.segment_offset()));
-  WELLSPACE_RETURN_IF_ERROR(CheckFaces(request.faces(), request.seed_offset()));
-  if (dimension() != 2) {
-    return NotInThePlane(request.has_segments() || !request.has_faces() ? "segments" : "faces", dimension());
-  }
+absl::Status Session::AddFeatures(const FeaturePart& part, const FeatureCounts& offset, uint64_t expected_revision) {
+  WELLSPACE_RETURN_IF_ERROR(CheckFeatures(part, offset, dimension()));
   absl::MutexLock change_lock(&change_mutex_);
   WELLSPACE_RETURN_IF_ERROR(LoadInputs());
-  uint64_t known_segments = 0;
-  uint64_t known_seeds = 0;
-  const uint64_t all_segments = request.segments().ends_size() / 2;
-  const uint64_t all_seeds = request.faces().seeds_size();
+  FeatureCounts known;
+  FeatureCounts added;
   FeatureSummary before;
   {
     absl::MutexLock lock(&mutex_);
     const FeatureStore& features = *stores_.features;
     WELLSPACE_RETURN_IF_ERROR(CheckReady(occupancy_, *state_, stores_.point_count(), expected_revision));
-    WELLSPACE_RETURN_IF_ERROR(CheckRepeatedFeatures(request, features, name(), &known_segments, &known_seeds));
-    if (known_segments == all_segments && known_seeds == all_seeds &&
-        !(request.has_faces() && features.HasOtherRules(request.faces()))) {
+    WELLSPACE_RETURN_IF_ERROR(CheckRepeated(part, offset, features, name(), &known));
+    added = CountsOf(part) - known;
+    if (added.all() == 0 && !features.HasOtherRules(part)) {
       return absl::OkStatus();
     }
     if (CheckMesh(*state_).ok()) {
       return MakeError(v1::ERROR_REASON_DOMAIN_FIXED,
                        absl::StrCat(name(),
-                                    " has been refined; segments and faces can be added only before the first "
-                                    "refinement: create another session for this domain"));
+                                    " has been refined; what bounds a domain can be added only before the "
+                                    "first refinement: create another session for this domain"));
     }
-    WELLSPACE_RETURN_IF_ERROR(account_.TakeFeatures(all_segments - known_segments, all_seeds - known_seeds));
+    WELLSPACE_RETURN_IF_ERROR(account_.TakeFeatures(added));
     before = features.Summary();
   }
   absl::Status status = RunGuarded([&] {
-    SessionChange change;
+    FeatureSummary after;
     {
       absl::MutexLock lock(&mutex_);
       FeatureStore& features = *stores_.features;
-      features.Append(request.segments(), known_segments);
-      if (request.has_faces()) {
-        features.Append(request.faces(), known_seeds);
-      }
-      change = FeaturesChange(*state_, request, known_segments, known_seeds, features.Summary());
+      features.Append(part, known);
+      after = features.Summary();
     }
+    SessionChange change = FeaturesChange(*state(), part, known, after);
     change_mutex_.AssertHeld();
     return Make(change, [] {});
   });
   if (!status.ok()) {
     absl::MutexLock lock(&mutex_);
     stores_.features->TakeBack(before);
-    account_.ReturnFeatures(all_segments - known_segments, all_seeds - known_seeds);
+    account_.ReturnFeatures(added);
   }
   return status;
 }

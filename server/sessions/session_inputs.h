@@ -10,22 +10,22 @@
 
 #include "absl/status/statusor.h"
 #include "core/geometry/criterion.h"
-#include "core/mesh_parameters.h"
+#include "core/input/mesh_parameters.h"
+#include "server/inputs/feature_store.h"
 #include "server/jobs/memory_budget.h"
-#include "server/sessions/feature_store.h"
 #include "server/sessions/session_state.h"
 #include "server/store/point_store.h"
-#include "server/store/session_log.h"
+#include "server/store/records.h"
 
 namespace wellspace::server {
 
 // The sizes at points that a session has, by the numbers of their sets.
 using SizeSets = std::map<uint64_t, std::shared_ptr<const core::SizeSamples>>;
 
-// Those that `log` has of `session`, which are to be `wanted`.
+// Those that `records` have of `session`, which are to be `wanted`.
 //
 // Errors:     DATA_LOSS.
-absl::StatusOr<SizeSets> ReadSizeSets(SessionLog& log, const std::string& session,
+absl::StatusOr<SizeSets> ReadSizeSets(Records& records, const std::string& session,
                                       const std::vector<SizesInUse>& wanted);
 
 // The inputs of a session, for the work that has the session to itself: nothing of them changes meanwhile.
@@ -36,7 +36,7 @@ struct SessionInputs {
   std::shared_ptr<const PointStore> points;
   std::shared_ptr<const FeatureStore> features;
   SizeSets sizes;
-  Lasts lasts = Lasts::kSession;  // how long memory is reserved for what is computed of them
+  Lasts lasts = Lasts::kSession;  // of the memory for results that are computed of them
 
   uint64_t point_count() const { return points->coordinate_count() / state->parameters->dimension; }
   // `parameters` with the sizes at points of this set; those of a step with its own; or those of an operation with the

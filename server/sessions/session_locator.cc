@@ -8,8 +8,8 @@ namespace wellspace::server {
 namespace {
 
 absl::StatusOr<std::shared_ptr<const LocatedMesh>> MakeLocated(const MeshSnapshot& mesh, Lasts lasts, Job& job) {
-  const auto dimension = static_cast<int>(mesh.figures().domain_low.size());
-  const uint64_t bytes = mesh.loaded_bytes() + core::MeshLocator::BytesFor(dimension, mesh.figures().simplices);
+  const auto dimension = static_cast<int>(mesh.record().domain_low_size());
+  const uint64_t bytes = mesh.loaded_bytes() + core::MeshLocator::BytesFor(dimension, mesh.record().simplices());
   auto located = std::make_shared<LocatedMesh>();
   const absl::Status made = job.RunApart([&](core::RunContext& context) -> absl::Status {
     WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(bytes));
@@ -19,7 +19,7 @@ absl::StatusOr<std::shared_ptr<const LocatedMesh>> MakeLocated(const MeshSnapsho
   });
   WELLSPACE_RETURN_IF_ERROR(made);
   located->revision = mesh.revision();
-  located->vertices = mesh.figures().vertices;
+  located->vertices = mesh.record().vertices();
   located->memory = job.TakeMemory(bytes);
   located->memory.MakeLasting(lasts);
   return located;

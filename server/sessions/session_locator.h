@@ -8,7 +8,7 @@
 #include <mutex>
 
 #include "absl/status/statusor.h"
-#include "core/mesh_locator.h"
+#include "core/mesh/mesh_locator.h"
 #include "server/jobs/job.h"
 #include "server/jobs/memory_budget.h"
 #include "server/store/mesh_snapshot.h"
@@ -33,8 +33,8 @@ class SessionLocator {
   // The last mesh of the session, or why there is none to locate points in.
   using LastMesh = std::function<absl::StatusOr<std::shared_ptr<const MeshSnapshot>>()>;
 
-  // What is kept if it is of the mesh that `last_mesh` says, or else made by `job`, on this thread, a worker's. Callers
-  // that come meanwhile wait on their threads: what they wait for needs no worker but the one that it has, since the
+  // The kept locator if its mesh is the one that `last_mesh` returns; else `job` makes one, on this thread, a worker's.
+  // Callers that come meanwhile wait on their threads: the work that they wait for needs no second worker, since the
   // memory is there at once or refused. Their cancels are seen after that.
   //
   // `lasts`: how long memory is reserved for it.
@@ -43,12 +43,12 @@ class SessionLocator {
   //             CANCELLED, DATA_LOSS.
   absl::StatusOr<std::shared_ptr<const LocatedMesh>> Prepare(const LastMesh& last_mesh, Lasts lasts, Job& job);
 
-  // Whether what is kept is of the mesh at `revision`.
+  // Whether the kept locator is of the mesh at `revision`.
   bool Has(uint64_t revision) const;
 
-  // How much memory GiveUp would free: 0 where points are being located in what is kept.
+  // The bytes that GiveUp would free: 0 while points are being located by the kept locator.
   uint64_t SpareBytes() const;
-  // Hands over what is kept, for the caller to free it without a lock; null where SpareBytes is 0.
+  // Hands over the kept locator, for the caller to free it without a lock; null where SpareBytes is 0.
   std::shared_ptr<const LocatedMesh> GiveUp();
 
  private:

@@ -1,4 +1,4 @@
-// What a session does with its operations.
+// Methods of Session about its operations.
 #include <algorithm>
 #include <utility>
 
@@ -20,7 +20,7 @@ absl::StatusOr<std::shared_ptr<Operation>> Session::StartOperation(core::MeshPar
     absl::MutexLock lock(&mutex_);
     WELLSPACE_RETURN_IF_ERROR(CheckReady(occupancy_, *state_, stores_.point_count(), expected_revision));
     const FeatureStore& features = *stores_.features;
-    WELLSPACE_RETURN_IF_ERROR(ValidateFor(features.View(), parameters));
+    WELLSPACE_RETURN_IF_ERROR(ValidateFor(features.InputOf({}), parameters));
     const bool has_mesh = CheckMesh(*state_).ok();
     if (!has_mesh) {
       WELLSPACE_RETURN_IF_ERROR(account_.CheckMesh(1));  // no mesh has fewer bytes
@@ -37,10 +37,11 @@ absl::StatusOr<std::shared_ptr<Operation>> Session::StartOperation(core::MeshPar
     operation = std::make_shared<Operation>(operation_name, std::move(record), std::move(parameters));
     occupancy_.BeginBusy(Busy::kStarting);
   }
-  absl::Status status = submit(operation);
-  if (status.ok()) {
-    status = CommitStart(operation, answer);
-  }
+  // An exception must not leave the session busy, and a worker that waits for the start.
+  const absl::Status status = RunGuarded([&]() -> absl::Status {
+    WELLSPACE_RETURN_IF_ERROR(submit(operation));
+    return CommitStart(operation, answer);
+  });
   if (status.ok()) {
     return operation;
   }
@@ -57,14 +58,15 @@ absl::StatusOr<std::shared_ptr<Operation>> Session::StartOperation(core::MeshPar
 
 absl::Status Session::CommitStart(const std::shared_ptr<Operation>& operation, const AnswerTo<v1::Operation>& answer) {
   absl::MutexLock change_lock(&change_mutex_);
-  SessionChange change;
+  AppendedPoints appended;
   std::shared_ptr<PointStore> points;  // null: none to be synchronised
   {
     absl::MutexLock lock(&mutex_);
     WELLSPACE_RETURN_IF_ERROR(CheckOpen(occupancy_, name()));  // it may have been closed meanwhile
-    change = StartChange(*state_, operation->Record(), stores_.appended());
+    appended = stores_.appended();
     points = stores_.point_count() > state_->record.points() ? stores_.points : nullptr;
   }
+  SessionChange change = StartChange(*state(), operation->Record(), appended);
   change.answer = AnswerRecordOf(answer, operation->Describe());
   if (points != nullptr) {
     WELLSPACE_RETURN_IF_ERROR(points->Synchronize());
@@ -96,7 +98,8 @@ absl::StatusOr<std::shared_ptr<Operation>> Session::ResumeOperation() {
   }
   const auto record = std::make_shared<const store::v1::OperationRecord>(
       refusal.ok() ? operation->Record() : operation->RecordOfFailure(clock_.wall(), refusal));
-  const absl::Status logged = Make(OperationChange(*state(), *record), [] {});
+  SessionChange change = OperationChange(*state(), *record);
+  const absl::Status logged = Make(change, [] {});
   // Where the disk is full, the next process finds what this one has found.
   if (!logged.ok() && !absl::IsResourceExhausted(logged)) {
     return logged;
@@ -126,8 +129,9 @@ std::optional<SessionWork> Session::BeginWork(Operation& operation) {
     }
     const auto record = std::make_shared<const store::v1::OperationRecord>(operation.RecordOfStart(clock_.wall()));
     // Should the process die in this work, the next one is to know. Without that it would only try once more.
+    SessionChange change = OperationChange(*state(), *record);
     (void)Make(
-        OperationChange(*state(), *record), [] {}, SessionLog::Survives::kProcessDeath);
+        change, [] {}, NoAnswer, Survives::kProcessDeath);
     (void)operation.Apply(record);
   }
   absl::MutexLock lock(&mutex_);
@@ -138,20 +142,16 @@ std::optional<SessionWork> Session::BeginWork(Operation& operation) {
 absl::Status Session::CommitSuccess(Operation& operation, WorkResult& result) {
   const uint64_t bytes = result.mesh->loaded_bytes();
   uint64_t bytes_before = 0;
-  SessionChange change;
   {
     absl::MutexLock lock(&mutex_);
     bytes_before = work_.mesh == nullptr ? 0 : work_.mesh->loaded_bytes();
     WELLSPACE_RETURN_IF_ERROR(account_.TakeMesh(bytes));
-    const MeshSnapshot::Figures& figures = result.mesh->figures();
-    change = SuccessChange(
-        *state_, operation.RecordOfSuccess(clock_.wall(), figures.revision, figures.vertices, figures.simplices),
-        RecordOf(*result.mesh));
   }
-  // What is dropped is freed without the lock.
+  // Dropped differences and sizes are freed without the lock.
   std::vector<MeshDeltas::Delta> deltas;
   SizeSets sizes;
-  const absl::Status status = Make(change, [&] {
+  SessionChange change;
+  const auto show = [&] {
     mutex_.AssertHeld();
     account_.SettleMesh(bytes);
     for (const uint64_t number : change.dropped_sizes) {
@@ -170,6 +170,13 @@ absl::Status Session::CommitSuccess(Operation& operation, WorkResult& result) {
     std::swap(work_, result.work);
     (void)operation.Apply(RecordOfOperation(*state_, operation.number()));
     occupancy_.EndBusy(clock_.since_boot());
+  };
+  const absl::Status status = RunGuarded([&] {
+    change_mutex_.AssertHeld();
+    const store::v1::MeshRecord& mesh = result.mesh->record();
+    change = SuccessChange(
+        *state(), operation.RecordOfSuccess(clock_.wall(), mesh.revision(), mesh.vertices(), mesh.simplices()), mesh);
+    return Make(change, show);
   });
   if (!status.ok()) {
     absl::MutexLock lock(&mutex_);
@@ -193,7 +200,8 @@ bool Session::EndWork(Operation& operation, WorkResult& result) {
       const bool is_parked = absl::IsCancelled(result.status) && !operation.IsCancelled() && log_.is_durable();
       const auto record = std::make_shared<const store::v1::OperationRecord>(
           is_parked ? operation.RecordOfParking() : operation.RecordOfFailure(clock_.wall(), result.status));
-      if (absl::IsResourceExhausted(Make(OperationChange(*state(), *record), [] {}))) {
+      SessionChange change = OperationChange(*state(), *record);
+      if (absl::IsResourceExhausted(Make(change, [] {}))) {
         return false;
       }
       if (is_parked) {
@@ -201,7 +209,7 @@ bool Session::EndWork(Operation& operation, WorkResult& result) {
       }
       absl::MutexLock lock(&mutex_);
       (void)operation.Apply(record);
-      std::swap(work_, result.work);  // what was there is freed without the lock
+      std::swap(work_, result.work);  // the old contents are freed without the lock
       occupancy_.EndBusy(clock_.since_boot());
     }
   }
@@ -223,7 +231,8 @@ absl::StatusOr<std::shared_ptr<Job>> Session::Cancel(Operation& operation) {
       record = operation.RecordOfFailure(clock_.wall(), absl::CancelledError("the operation was cancelled"));
       record.set_is_cancelled(true);
     }
-    WELLSPACE_RETURN_IF_ERROR(Make(OperationChange(*state(), record), [&] {
+    SessionChange change = OperationChange(*state(), record);
+    WELLSPACE_RETURN_IF_ERROR(Make(change, [&] {
       mutex_.AssertHeld();
       job = operation.Apply(RecordOfOperation(*state_, operation.number()));
       if (is_queued) {

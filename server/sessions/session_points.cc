@@ -1,4 +1,4 @@
-// What a session does with the points that are uploaded to it.
+// Methods of Session about the points that are uploaded to it.
 #include <algorithm>
 #include <utility>
 
@@ -94,7 +94,7 @@ uint64_t Session::UncommittedBytes() const {
 
 absl::Status Session::CommitPoints() {
   absl::MutexLock change_lock(&change_mutex_);
-  SessionChange change;
+  AppendedPoints appended;
   std::shared_ptr<PointStore> points;
   uint32_t crc32c = 0;
   {
@@ -103,14 +103,17 @@ absl::Status Session::CommitPoints() {
     if (stores_.point_count() == state_->record.points() || occupancy_.busy == Busy::kRemovingPoints) {
       return absl::OkStatus();
     }
-    change = PointsChange(*state_, stores_.appended());
+    appended = stores_.appended();
     points = stores_.points;
     crc32c = std::exchange(stores_.new_crc32c, 0);  // from now on, of the points behind these
   }
-  absl::Status status = points->Synchronize();
-  if (status.ok()) {
-    status = Make(change, [] {});
-  }
+  // An exception must not leave points behind without their checksum.
+  absl::Status status = RunGuarded([&]() -> absl::Status {
+    change_mutex_.AssertHeld();
+    WELLSPACE_RETURN_IF_ERROR(points->Synchronize());
+    SessionChange change = PointsChange(*state(), appended);
+    return Make(change, [] {});
+  });
   if (status.ok()) {
     return status;
   }

@@ -29,26 +29,41 @@ SessionRegistry::SessionRegistry(const ServiceOptions& options, MemoryBudget& me
 
 absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Create(NewSession settings,
                                                                  const AnswerTo<v1::Session>& answer) {
-  SessionChange creation;
-  WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Session> session, Prepare(std::move(settings), &creation));
-  absl::Status logged = RunGuarded([&] {  // without a lock: it takes long
+  const std::string tenant = settings.tenant;
+  std::shared_ptr<TenantPoints> points;
+  absl::Time create_time;
+  WELLSPACE_RETURN_IF_ERROR(TakePlace(tenant, &points, &create_time));
+  std::shared_ptr<Session> session;
+  absl::Status logged = RunGuarded([&]() -> absl::Status {  // without a lock: it takes long
+    SessionChange creation = CreationChange({.tenant = tenant,
+                                             .name = make_name_(),
+                                             .parameters = std::move(settings.parameters),
+                                             .labels = std::move(settings.labels),
+                                             .ttl = settings.ttl,
+                                             .create_time = create_time,
+                                             .epoch = log_.records().epoch()});
+    // A session that is new is one that has had no change but this.
+    const StoredSession created{.epoch = creation.epoch, .state = *creation.state, .steps = {}, .operations = {}};
+    WELLSPACE_ASSIGN_OR_RETURN(session, Session::Restore(created, options_, memory_, clock_, points, log_));
     creation.answer = AnswerRecordOf(answer, session->Describe());
-    return log_.is_durable() ? log_.Commit(creation) : absl::OkStatus();
+    const absl::Status committed = log_.Commit(creation);
+    return IsOwnedElsewhere(committed) ? Elsewhere(session->name()) : committed;
   });
   std::lock_guard lock(mutex_);
-  --tenants_[session->tenant()].pending;
+  --tenants_[tenant].pending;
   --pending_;
   if (!logged.ok()) {
-    DropIfEmpty(session->tenant());
+    DropIfEmpty(tenant);
     return logged;
   }
   Publish(session);
   return session;
 }
 
-absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Prepare(NewSession settings, SessionChange* creation) {
+absl::Status SessionRegistry::TakePlace(const std::string& tenant_name, std::shared_ptr<TenantPoints>* points,
+                                        absl::Time* create_time) {
   std::lock_guard lock(mutex_);
-  const auto known = tenants_.find(settings.tenant);
+  const auto known = tenants_.find(tenant_name);
   const size_t count = known == tenants_.end() ? 0 : known->second.sessions.size() + known->second.pending;
   if (count >= options_.max_sessions_per_tenant) {
     return MakeError(v1::ERROR_REASON_QUOTA_EXCEEDED,
@@ -60,27 +75,23 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Prepare(NewSession set
                      absl::StrCat("this server has ", by_name_.size() + pending_, " sessions, as many as it may have"));
   }
   last_create_time_ = std::max(clock_.wall(), last_create_time_ + absl::Microseconds(1));
-  *creation = CreationChange({.tenant = std::move(settings.tenant),
-                              .name = make_name_(),
-                              .parameters = std::move(settings.parameters),
-                              .labels = std::move(settings.labels),
-                              .ttl = settings.ttl,
-                              .create_time = last_create_time_});
-  // A session that is new is one that has had no change but this.
-  const StoredSession created{.state = *creation->state, .steps = {}, .operations = {}};
-  Tenant& tenant = tenants_[created.state.tenant()];
-  WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Session> session,
-                             Session::Restore(created, options_, memory_, clock_, tenant.points, log_));
+  *create_time = last_create_time_;
+  Tenant& tenant = tenants_[tenant_name];
+  *points = tenant.points;
   ++tenant.pending;
   ++pending_;
-  return session;
+  return absl::OkStatus();
 }
 
 absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Restore(const StoredSession& stored) {
+  std::shared_ptr<TenantPoints> points;
+  {
+    std::lock_guard lock(mutex_);
+    points = tenants_[stored.state.tenant()].points;
+  }
+  WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Session> session,
+                             Session::Restore(stored, options_, memory_, clock_, std::move(points), log_));
   std::lock_guard lock(mutex_);
-  WELLSPACE_ASSIGN_OR_RETURN(
-      std::shared_ptr<Session> session,
-      Session::Restore(stored, options_, memory_, clock_, tenants_[stored.state.tenant()].points, log_));
   last_create_time_ = std::max(last_create_time_, session->create_time());
   Publish(session);
   return session;
@@ -106,7 +117,11 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Find(const std::string
       session = found->second;
     }
   }
-  if (session == nullptr || session->tenant() != tenant || !session->Renew()) {
+  const bool is_own = session != nullptr && session->tenant() == tenant;
+  if (is_own && session->IsElsewhere()) {
+    return Elsewhere(name);
+  }
+  if (!is_own || !session->Renew()) {
     return MakeError(v1::ERROR_REASON_SESSION_NOT_FOUND,
                      absl::StrCat("there is no ", name, "; it may have been deleted, or have expired"));
   }
@@ -126,7 +141,8 @@ std::vector<std::shared_ptr<Session>> SessionRegistry::List(const std::string& t
   }
   std::vector<std::shared_ptr<Session>> listed;
   for (const std::shared_ptr<Session>& session : sessions) {
-    if (listed.size() < count && HasLabels(*session->state(), labels) && !session->IsExpired()) {
+    if (listed.size() < count && HasLabels(*session->state(), labels) && !session->IsExpired() &&
+        !session->IsElsewhere()) {
       listed.push_back(session);
     }
   }

@@ -1,4 +1,4 @@
-// The sessions of a process, in memory; a SessionLog has what outlives it.
+// The sessions of a process, in memory; a SessionLog has the data that outlive it.
 #ifndef WELLSPACE_SERVER_SESSIONS_SESSION_REGISTRY_H_
 #define WELLSPACE_SERVER_SESSIONS_SESSION_REGISTRY_H_
 
@@ -13,14 +13,14 @@
 
 #include "absl/status/statusor.h"
 #include "absl/time/time.h"
-#include "core/mesh_parameters.h"
+#include "core/input/mesh_parameters.h"
 #include "server/base/options.h"
 #include "server/jobs/memory_budget.h"
 #include "server/sessions/session.h"
 
 namespace wellspace::server {
 
-// What a new session is made of.
+// The properties of a session that is to be created.
 struct NewSession {
   std::string tenant;
   core::MeshParameters parameters;
@@ -33,8 +33,8 @@ std::string UnguessableSessionName();
 
 // The sessions of all tenants. No tenant sees those of another.
 //
-// Thread safety: thread-safe. No session is asked with the lock of the registry held: one that is written to, or read,
-//                may have its own for a while, which is not to hold up the others.
+// Thread safety: thread-safe. No session is asked anything under the lock of the registry: one that is written to, or
+//                read, may hold its own lock for a while, and must not hold up the others.
 // Invariants: (1) never more sessions than the limits of the server allow, but those of Restore; (2) names are never
 //             used again, and cannot be guessed.
 class SessionRegistry {
@@ -56,7 +56,8 @@ class SessionRegistry {
 
   // The session `name` of `tenant`, its lease renewed.
   //
-  // Errors:     SESSION_NOT_FOUND: there is none, it has expired, or it is another tenant's.
+  // Errors:     SESSION_NOT_FOUND: there is none, it has expired, or it is another tenant's. SESSION_ELSEWHERE: another
+  //             server has taken it over.
   absl::StatusOr<std::shared_ptr<Session>> Find(const std::string& tenant, const std::string& name);
 
   // Of the sessions of `tenant` that were created after `after`, in the order of their creation, the first `count` that
@@ -73,7 +74,7 @@ class SessionRegistry {
   // How many there are, of all tenants.
   size_t Count() const;
 
-  // What the sessions of a tenant keep; and those of all tenants together, and of the one that keeps most.
+  // Bytes that the sessions of a tenant keep; those of all tenants together, and of the tenant that keeps most.
   uint64_t StoredBytes(const std::string& tenant) const;
   struct Stored {
     uint64_t all = 0;
@@ -91,8 +92,10 @@ class SessionRegistry {
     size_t pending = 0;                                       // that are being written down
   };
 
-  // A session that has its place, but is not shown yet; and the change that is to be committed of it.
-  absl::StatusOr<std::shared_ptr<Session>> Prepare(NewSession settings, SessionChange* creation);
+  // Takes a place for a session of `tenant` that is going to be made.
+  //
+  // Errors:     QUOTA_EXCEEDED, TOO_MANY_SESSIONS.
+  absl::Status TakePlace(const std::string& tenant, std::shared_ptr<TenantPoints>* points, absl::Time* create_time);
 
   // The following want mutex_ to be held.
   void Publish(const std::shared_ptr<Session>& session);

@@ -1,4 +1,4 @@
-// What a session does to take points out.
+// Methods of Session that remove points.
 #include <algorithm>
 #include <utility>
 #include <vector>
@@ -14,7 +14,7 @@ namespace {
 
 constexpr uint64_t kCopiedPoints = uint64_t{1} << 16;  // at a time
 
-// Refuses ascending `numbers` that are not all points of `session`, which has `count`, or of which segments are made.
+// Refuses ascending `numbers` that are not all points of `session`, which has `count`, or of which features are made.
 absl::Status CheckRemovable(std::span<const uint64_t> numbers, uint64_t count, const FeatureStore& features,
                             const std::string& session) {
   if (numbers.empty()) {
@@ -30,10 +30,11 @@ absl::Status CheckRemovable(std::span<const uint64_t> numbers, uint64_t count, c
   if (const auto twice = std::ranges::adjacent_find(numbers); twice != numbers.end()) {
     return refusal(absl::StrCat("points has ", *twice, " twice; each number is accepted once"));
   }
-  const std::span<const uint32_t> ends = features.ends();
-  if (const auto last = std::ranges::max_element(ends); last != ends.end() && numbers.front() <= *last) {
-    return refusal(absl::StrCat("points has ", numbers.front(), ", but segments of ", session, " end at points up to ",
-                                *last, "; those behind can be removed"));
+  const std::span<const uint32_t> named = features.points();
+  if (const auto last = std::ranges::max_element(named); last != named.end() && numbers.front() <= *last) {
+    const char* const what = features.counts().triangles > 0 ? "triangles" : "segments";
+    return refusal(absl::StrCat("points has ", numbers.front(), ", but ", what, " of ", session,
+                                " end at points up to ", *last, "; those behind can be removed"));
   }
   return absl::OkStatus();
 }
@@ -71,11 +72,11 @@ class PointRemoval {
   // `numbers` are ascending.
   PointRemoval(Session& session, std::span<const uint64_t> numbers) : session_(session), numbers_(numbers) {}
 
-  // What it does before it copies points; makes the session Busy::kRemovingPoints.
+  // Checks the request, before any point is copied, and makes the session Busy::kRemovingPoints.
   absl::Status Begin(uint64_t expected_revision);
   // Writes the points that are left to a store of their own, and commits that.
   absl::Status Remove(const AnswerTo<PointsLeft>& answer);
-  // The session is free again. Returns what it has.
+  // The session is free again. Returns the number of its points, and its revision.
   PointsLeft End();
 
  private:
@@ -86,8 +87,8 @@ class PointRemoval {
   SessionWork work_;  // of the session; the structure goes with its points
   PointsThatAreLeft left_;
   MemoryReservation memory_;           // that the copy takes besides, if it is in memory
-  std::shared_ptr<PointStore> store_;  // of what is left; once the change is made, that of before; null: not begun
-  uint64_t store_file_ = 0;            // its number
+  std::shared_ptr<PointStore> store_;  // of the points left; once the change is made, that of before; null: none
+  std::vector<store::v1::PointsFile> store_files_;  // where it lies
 };
 
 absl::Status PointRemoval::Begin(uint64_t expected_revision) {
@@ -110,13 +111,15 @@ absl::Status PointRemoval::Begin(uint64_t expected_revision) {
 absl::Status PointRemoval::Remove(const AnswerTo<PointsLeft>& answer) {
   const SessionInputs inputs = session_.inputs();
   const int dimension = session_.dimension();
-  left_ = {.points = inputs.point_count() - numbers_.size(), .file = NextRevision(*inputs.state)};
+  left_.points = inputs.point_count() - numbers_.size();
+  left_.file.set_number(NextRevision(*inputs.state));
+  left_.file.set_epoch(inputs.state->epoch);
   if (inputs.points->is_in_memory()) {
     const uint64_t bytes = left_.points * dimension * sizeof(double);
     WELLSPACE_ASSIGN_OR_RETURN(memory_, session_.memory_.Reserve(bytes, "the points that are left of a session"));
   }
-  store_file_ = left_.file;
-  store_ = session_.log_.OpenPoints(session_.name(), dimension, store_file_, {});
+  store_files_ = {left_.file};
+  store_ = session_.log_.files().OpenPoints({.session = session_.name(), .dimension = dimension, .next = left_.file});
   WELLSPACE_RETURN_IF_ERROR(CopyWithout(*inputs.points, dimension, numbers_, *store_, &left_.crc32c));
   WELLSPACE_RETURN_IF_ERROR(Commit(answer));
   work_.mesher = nullptr;
@@ -128,7 +131,7 @@ absl::Status PointRemoval::Commit(const AnswerTo<PointsLeft>& answer) {
   absl::MutexLock change_lock(&session_.change_mutex_);
   const std::shared_ptr<const SessionState> before = session_.state();
   SessionChange change = RemovalChange(*before, left_);
-  change.answer = AnswerRecordOf(answer, PointsLeft{.points = left_.points, .revision = left_.file});
+  change.answer = AnswerRecordOf(answer, PointsLeft{.points = left_.points, .revision = left_.file.number()});
   SizeSets unused;  // is freed without the lock
   return session_.Make(change, [&] {
     session_.mutex_.AssertHeld();
@@ -140,7 +143,8 @@ absl::Status PointRemoval::Commit(const AnswerTo<PointsLeft>& answer) {
       unused.insert(std::move(set));
     }
     std::swap(stores.points, store_);
-    store_file_ = before->record.points_file();
+    store_files_ = PointsFilesOf(before->record);
+    store_files_.push_back(std::exchange(stores.file, left_.file));
     stores.new_crc32c = 0;
     work_ = session_.work_.TakeMesher();
   });
@@ -155,7 +159,9 @@ PointsLeft PointRemoval::End() {
   }
   // The store that the session has no more, or has not come to have.
   if (std::exchange(store_, nullptr) != nullptr) {
-    session_.log_.DropPoints(session_.name(), store_file_);
+    for (const store::v1::PointsFile& file : store_files_) {
+      session_.log_.files().DropPoints(session_.name(), file);
+    }
   }
   session_.NoteIdle();
   return left;

@@ -1,12 +1,12 @@
-// What a session does with sizes at points.
+// Methods of Session about sizes at points.
 #include <algorithm>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "core/base/status_macros.h"
+#include "server/inputs/size_store.h"
 #include "server/sessions/session.h"
-#include "server/sessions/size_store.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
@@ -19,9 +19,9 @@ bool AreEqual(const core::SizeSamples* a, const core::SizeSamples* b) {
 
 }  // namespace
 
-absl::StatusOr<SizeSets> ReadSizeSets(SessionLog& log, const std::string& session,
+absl::StatusOr<SizeSets> ReadSizeSets(Records& records, const std::string& session,
                                       const std::vector<SizesInUse>& wanted) {
-  WELLSPACE_ASSIGN_OR_RETURN(std::vector<StoredSizes> stored, log.ReadSizes(session));
+  WELLSPACE_ASSIGN_OR_RETURN(std::vector<StoredSizes> stored, records.ReadSizes(session));
   SizeSets sets;
   for (StoredSizes& set : stored) {
     sets[set.number] = SamplesOf(std::move(set.parts));
@@ -43,7 +43,7 @@ absl::Status Session::SetSizes(const std::shared_ptr<const core::SizeSamples>& s
   absl::MutexLock change_lock(&change_mutex_);
   WELLSPACE_RETURN_IF_ERROR(LoadInputs());
   const uint64_t count = samples == nullptr ? 0 : samples->sizes.size();
-  SessionChange change;
+  SessionChange change = SizesChange(*state(), samples);
   uint64_t dropped = 0;
   {
     absl::MutexLock lock(&mutex_);
@@ -59,11 +59,10 @@ absl::Status Session::SetSizes(const std::shared_ptr<const core::SizeSamples>& s
     if (samples != nullptr) {
       WELLSPACE_RETURN_IF_ERROR(CheckSamples(BoxOf(*state_), dimension(), *samples));
     }
-    change = SizesChange(*state_, samples);
     for (const uint64_t number : change.dropped_sizes) {
       dropped += stores_.sizes.at(number)->sizes.size();
     }
-    // The sets that are dropped are there until the end, beside the new one: what is reserved for it is handed over
+    // The sets that are dropped are there until the end, beside the new one: its reservation is handed over
     // only as far as the account grows.
     if (received != nullptr && samples != nullptr) {
       const uint64_t beside = samples->bytes() / count * std::min(count, dropped);

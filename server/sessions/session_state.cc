@@ -6,7 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
-#include "core/meshing_version.h"
+#include "core/meshers/meshing_version.h"
 #include "server/wire/convert.h"
 #include "server/wire/errors.h"
 
@@ -16,7 +16,7 @@ namespace {
 using store::v1::OperationRecord;
 using store::v1::StepRecord;
 
-// Parameters are others after a refinement alone.
+// Only a refinement changes the parameters.
 absl::Status ApplyRecord(const SessionChange& change, SessionState& state) {
   const store::v1::SessionRecord& record = *change.state;
   if (record.sizes() != state.record.sizes()) {
@@ -30,8 +30,8 @@ absl::Status ApplyRecord(const SessionChange& change, SessionState& state) {
   return absl::OkStatus();
 }
 
-// A refinement that begins a structure takes the place of all steps before. What another version of the core has made
-// cannot be made again, and neither can what follows on it.
+// A refinement that begins a structure takes the place of all steps before. Steps of another version of the core
+// cannot be made again, and neither can those that follow.
 absl::Status ApplyRefinement(const StepRecord::Refined& refined, SessionSteps& steps) {
   if (refined.begins()) {
     steps = SessionSteps();
@@ -105,8 +105,10 @@ absl::StatusOr<SessionState> Apply(const SessionState& before, const SessionChan
 }
 
 absl::StatusOr<SessionState> StateOf(const StoredSession& stored) {
+  SessionState empty;
+  empty.epoch = stored.epoch;
   return Apply(
-      SessionState(),
+      empty,
       {.session = stored.state.name(), .state = stored.state, .steps = stored.steps, .operations = stored.operations});
 }
 

@@ -1,4 +1,4 @@
-// What a session is, as its log has it; and the one function by which it changes.
+// The state of a session, as its log has it; and the one function by which it changes.
 #ifndef WELLSPACE_SERVER_SESSIONS_SESSION_STATE_H_
 #define WELLSPACE_SERVER_SESSIONS_SESSION_STATE_H_
 
@@ -10,10 +10,10 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "core/mesh_parameters.h"
+#include "core/input/mesh_parameters.h"
 #include "server/sessions/session_box.h"
 #include "server/sessions/session_steps.h"
-#include "server/store/session_log.h"
+#include "server/store/records.h"
 #include "wellspace/store/v1/records.pb.h"
 
 namespace wellspace::server {
@@ -21,15 +21,15 @@ namespace wellspace::server {
 // The state of a session: all that is the same in every process that has its log. It is a value, which a Session shows
 // by a pointer and never changes: the next state is another value, which Apply makes.
 //
-// What a process has besides (the structure, points that are not committed, who is at work, when the lease ends) is in
+// Other data of a process (the structure, points that are not committed, who is at work, when the lease ends) are in
 // Session.
 //
 // Thread safety: thread-compatible.
 // Invariants: (1) it is Apply of all changes that the log has of the session, one after the other, to an empty state;
 //             (2) `parameters` are those of `record`; (3) steps.points() <= record.points().
 struct SessionState {
-  // What clients see: labels, length of the lease, revision, counts, features, set of sizes, last mesh. The mesh of a
-  // log that keeps nothing has its figures here, too.
+  // The data for clients: labels, length of the lease, revision, counts, features, set of sizes, last mesh. The
+  // mesh of a log that keeps nothing has its figures here, too.
   store::v1::SessionRecord record;
   std::shared_ptr<const core::MeshParameters> parameters{};  // without sizes at points; null of an empty state
   SessionSteps steps{};                                      // none, where Replay could not take them
@@ -39,12 +39,13 @@ struct SessionState {
   uint64_t sizes_revision = 0;
   uint64_t structure_version = 0;  // another one for each structure that queries may see; 0: none yet
   bool is_deleted = false;
+  uint64_t epoch = 0;  // at which this process owns the session; its changes carry it
 
   const std::string& name() const { return record.name(); }
   SizesInUse sizes() const { return {.number = record.sizes(), .count = record.size_count()}; }
 };
 
-// The state after `change`. This is what a change does: once it is committed, when it is read again after a restart,
+// The state after `change`. It is the effect of a change: once it is committed, when it is read again after a restart,
 // and in the tests' model of the log.
 //
 // REQUIRES:   it is a change of this session; the first one has the whole record.
@@ -72,7 +73,7 @@ bool HasLabels(const SessionState& state, const std::map<std::string, std::strin
 // The sets of sizes that `state` has and that are of no use once only `steps`, and the set `current`, are there.
 std::vector<SizesInUse> UnusedSizes(const SessionState& state, const SessionSteps& steps, uint64_t current);
 
-// What the revision is once the session has `points`, all that were appended.
+// The revision once the session has `points`, all that were appended.
 uint64_t RevisionWith(const SessionState& state, uint64_t points);
 
 // The revision that the work makes which has the session to itself: no other change makes one meanwhile.

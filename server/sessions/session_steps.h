@@ -1,4 +1,4 @@
-// What the structure of a session was made by.
+// The steps that have made the structure of a session.
 #ifndef WELLSPACE_SERVER_SESSIONS_SESSION_STEPS_H_
 #define WELLSPACE_SERVER_SESSIONS_SESSION_STEPS_H_
 
@@ -7,7 +7,7 @@
 #include <memory>
 #include <vector>
 
-#include "core/mesh_parameters.h"
+#include "core/input/mesh_parameters.h"
 
 namespace wellspace::server {
 
@@ -30,8 +30,8 @@ struct SessionStep {
 };
 
 // The steps of a session that succeeded, in their order. Structure and mesh are a function of these, of the points, the
-// features and the sizes: Replay (server/sessions/replay.h) computes it. What did not succeed is no step. They are as
-// well in the SessionLog.
+// features and the sizes: Replay (server/sessions/replay.h) computes it. A failed change is no step. The SessionLog
+// has the steps, too.
 //
 // A value. Copies share all but the last steps, so that a session with many additions is as cheap to change as others.
 //

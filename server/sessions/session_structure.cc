@@ -1,4 +1,4 @@
-// What a session does with its structure: has it built again, and adds vertices to it.
+// Methods of Session about its structure: they have it built again, and add vertices to it.
 #include <algorithm>
 #include <limits>
 #include <utility>
@@ -82,6 +82,7 @@ Session::Size Session::GetSize(uint64_t few) const {
   Size size;
   size.points = stores_.point_count();
   size.segments = state_->record.segments();
+  size.triangles = state_->record.triangles();
   if (size.points <= few) {
     size.some_points = stores_.points->CopyFrom(0, core::RunContext()).value_or(std::vector<double>());
   }
@@ -116,12 +117,12 @@ class VertexAddition {
   VertexAddition(Session& session, std::span<const double> points, std::span<const uint32_t> near)
       : session_(session), points_(points), near_(near), count_(points.size() / session.dimension()) {}
 
-  // What it does before it touches the mesher, which it takes; makes the session Busy::kAddingVertices.
+  // Checks the request, takes the mesher, and makes the session Busy::kAddingVertices.
   absl::Status Begin(uint64_t expected_revision);
-  // Has the mesher take the points in, and commits that. On an error the session has what it had; a mesher that has
+  // Has the mesher take the points in, and commits that. On an error the session is as it was; a mesher that has
   // more is given up.
   absl::StatusOr<AddedVertices> Add(core::RunContext& context, const AnswerTo<AddedVertices>& answer);
-  // The session is free again; `is_made`: what Add says.
+  // The session is free again; `is_made`: whether Add succeeded.
   void End(bool is_made);
 
  private:
@@ -182,7 +183,7 @@ absl::StatusOr<AddedVertices> VertexAddition::Add(core::RunContext& context, con
     // others.
     DropMesher();
   } else if (session_.memory_.is_limited()) {
-    // What was reserved is more than was needed but for the most uneven points; those are counted by the next
+    // The reservation is larger than the need, but for the most uneven points; those are counted by the next
     // refinement.
     (void)work_.memory.Resize(work_.mesher->memory_bytes());
   }
@@ -207,7 +208,7 @@ absl::StatusOr<std::vector<uint32_t>> VertexAddition::AddToMesher(core::RunConte
   WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> waiting,
                              inputs.points->CopyFrom(meshed * session_.dimension(), context));
   if (!waiting.empty()) {
-    // What is wrong with the vertices shows before the mesher has taken in others, which would cost it.
+    // Bad vertices are refused before the mesher takes in the uploads: an error after that costs the mesher.
     WELLSPACE_RETURN_IF_ERROR(CheckNear(near_, mesher, waiting.size() / session_.dimension()));
     WELLSPACE_RETURN_IF_ERROR(CheckPoints(BoxOf(*inputs.state), session_.dimension(), 0, points_));
     WELLSPACE_RETURN_IF_ERROR(mesher.AddPoints(waiting, context).status());
@@ -235,8 +236,8 @@ absl::Status VertexAddition::Commit(const AnswerTo<AddedVertices>& answer, Added
     store = session_.stores_.points;
     known = session_.stores_.point_count();
     const uint32_t crc32c = ExtendCrc32c(session_.stores_.new_crc32c, points_.data(), points_.size_bytes());
-    change =
-        AdditionChange(*before, {.end = known + count_, .crc32c = crc32c}, before->steps.points() + uploaded_, count_);
+    change = AdditionChange(*before, {.end = known + count_, .crc32c = crc32c, .file = session_.stores_.file},
+                            before->steps.points() + uploaded_, count_);
     added->revision = change.state->revision();
   }
   change.answer = AnswerRecordOf(answer, *added);

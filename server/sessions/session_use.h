@@ -1,4 +1,4 @@
-// What keeps a session, its uploads or its structure, for as long as it is used.
+// Guards that keep a session, its uploads or its structure, for as long as it is used.
 #ifndef WELLSPACE_SERVER_SESSIONS_SESSION_USE_H_
 #define WELLSPACE_SERVER_SESSIONS_SESSION_USE_H_
 
@@ -39,7 +39,7 @@ class UploadUse {
   const std::shared_ptr<Session> session_;
 };
 
-// Keeps a session from giving up its structure for other work: what PrepareStructure has built stays until it was
+// Keeps a session from giving up its structure for other work: the one of PrepareStructure stays until it was
 // asked.
 class StructureUse {
  public:

@@ -1,4 +1,4 @@
-// What a session hands to the work of an operation, and gets back.
+// Data that a session hands to the work of an operation, and gets back.
 #ifndef WELLSPACE_SERVER_SESSIONS_SESSION_WORK_H_
 #define WELLSPACE_SERVER_SESSIONS_SESSION_WORK_H_
 
@@ -6,14 +6,14 @@
 #include <utility>
 
 #include "absl/status/status.h"
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "server/jobs/memory_budget.h"
 #include "server/sessions/mesh_deltas.h"
 #include "server/store/mesh_snapshot.h"
 
 namespace wellspace::server {
 
-// What an operation works on. While it runs, the mesher is its alone; the mesh is shared, and never changed.
+// Data that an operation works on. While it runs, the mesher is its alone; the mesh is shared, and never changed.
 struct SessionWork {
   MemoryReservation memory;  // of `mesher`; first, so that it is given back when that is freed
   // Of the session's points it has, or would have if it was not given up, those of the steps. Null: there is none yet,
@@ -25,10 +25,10 @@ struct SessionWork {
   SessionWork TakeMesher() { return {.memory = std::move(memory), .mesher = std::move(mesher), .mesh = mesh}; }
 };
 
-// How the work of an operation has ended.
+// The result of an operation's work.
 struct WorkResult {
   absl::Status status;
-  SessionWork work;                    // what BeginWork gave; on an error its mesher is as it was, or null
+  SessionWork work;                    // that of BeginWork; on an error its mesher is as it was, or null
   std::shared_ptr<MeshSnapshot> mesh;  // the new mesh, if the status is OK
   MeshDeltas::Delta delta{};           // from the last mesh to it; null: not made
 };

@@ -44,17 +44,18 @@ absl::Status CopyFile(FileSystem& files, const std::string& from, const std::str
 // Copies the files that `session` names.
 absl::Status CopyFiles(FileSystem& files, const DataPaths& from, const DataPaths& to,
                        const store::v1::SessionRecord& session) {
-  if (session.points() > 0) {
-    const uint64_t size = session.points() * session.parameters().dimension() * sizeof(double);
-    const uint64_t number = session.points_file();
-    WELLSPACE_RETURN_IF_ERROR(
-        CopyFile(files, from.points(session.name(), number), to.points(session.name(), number), size));
+  const std::vector<store::v1::PointsFile> points_files = PointsFilesOf(session);
+  for (size_t i = 0; i < points_files.size(); ++i) {
+    const uint64_t end = i + 1 < points_files.size() ? points_files[i + 1].first() : session.points();
+    const uint64_t size = (end - points_files[i].first()) * session.parameters().dimension() * sizeof(double);
+    WELLSPACE_RETURN_IF_ERROR(CopyFile(files, from.points(session.name(), points_files[i]),
+                                       to.points(session.name(), points_files[i]), size));
   }
   if (!session.has_mesh()) {
     return absl::OkStatus();
   }
-  const std::string source = from.mesh(session.name(), session.mesh().revision());
-  const std::string target = to.mesh(session.name(), session.mesh().revision());
+  const std::string source = from.mesh(session.name(), session.mesh().revision(), session.mesh().epoch());
+  const std::string target = to.mesh(session.name(), session.mesh().revision(), session.mesh().epoch());
   return files.Link(source, target).ok() ? absl::OkStatus() : CopyFile(files, source, target, session.mesh().size());
 }
 

@@ -17,7 +17,7 @@ namespace wellspace::server {
 // Complexity: O(bytes); with links, O(bytes of the database and of points), and the check.
 // Errors:     FAILED_PRECONDITION: `to` is not empty, in use, or within `folder`, or another back-up of `folder` is
 //             under way. FILE_DAMAGED: the write-ahead log of `folder` is. DATA_LOSS: the copy is not whole, since
-//             `folder` is not. Others of CheckData, and of a FileSystem. What was copied until then is left.
+//             `folder` is not. Others of CheckData, and of a FileSystem. Files copied until then are left.
 absl::StatusOr<DataReport> BackUp(const std::string& folder, const std::string& to,
                                   const CheckDataOptions& options = {});
 

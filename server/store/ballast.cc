@@ -53,7 +53,7 @@ absl::Status Ballast::Write() {
   for (size = std::min(size, bytes_); size < bytes_; size += block.size()) {
     const uint64_t count = std::min<uint64_t>(block.size(), bytes_ - size);
     if (const absl::Status written = file->WriteAt(size, {block.data(), count}); !written.ok()) {
-      // What little there is stays with those who delete.
+      // Without the whole ballast, the little room that is left is free for deletions.
       file->Truncate(0).IgnoreError();
       return written;
     }

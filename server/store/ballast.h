@@ -1,4 +1,4 @@
-// Room on the disk that is given up so that what frees more can be written.
+// Room on the disk that is given up so that deletions, which free more, can be written.
 #ifndef WELLSPACE_SERVER_STORE_BALLAST_H_
 #define WELLSPACE_SERVER_STORE_BALLAST_H_
 
@@ -12,7 +12,7 @@
 
 namespace wellspace::server {
 
-// A file without meaning. Of a full disk it holds what a deletion has to write; while it is not whole nothing else may
+// A file without meaning. On a full disk it is room for a deletion's writes; while it is not whole nothing else may
 // grow, so that no other takes that room.
 //
 // Thread safety: thread-safe.
@@ -21,7 +21,7 @@ class Ballast {
   // Of `bytes`; 0: there is none, and nothing is held back.
   Ballast(FileSystem& files, std::string path, uint64_t bytes);
 
-  // Makes it whole, if it is not. To be called before what takes up room.
+  // Makes it whole, if it is not. To be called before a change that takes up room.
   //
   // Complexity: O(1) when it is whole, else O(bytes).
   // Errors:     those of a FileSystem. RESOURCE_EXHAUSTED: the disk has no room for it, and so not for anything else.

@@ -9,6 +9,7 @@
 #include "core/base/status_macros.h"
 #include "server/store/data_folder.h"
 #include "server/store/files_in_use.h"
+#include "server/store/joined_points.h"
 #include "server/store/mesh_file.h"
 #include "server/store/point_file.h"
 #include "server/store/store_health.h"
@@ -65,10 +66,23 @@ class SessionCheck {
       Add("there are ", state_.points(), " points, and ", points, " in its steps");
       return;
     }
-    const PointFile file(files_, std::make_shared<StoreHealth>(nullptr), /*written=*/nullptr,
-                         paths_.points(state_.name(), state_.points_file()), state_.parameters().dimension(),
-                         std::move(committed));
-    Add(file.Checksum(0, file.coordinate_count()).status());
+    if (committed.empty()) {
+      return;
+    }
+    const std::vector<store::v1::PointsFile> points_files = PointsFilesOf(state_);
+    const auto open = [&](const store::v1::PointsFile& file, bool /*is_written*/,
+                          std::vector<store::v1::StepRecord::Points> of_file) {
+      return std::make_unique<PointFile>(files_, std::make_shared<StoreHealth>(nullptr), /*written=*/nullptr,
+                                         paths_.points(state_.name(), file), state_.parameters().dimension(),
+                                         std::move(of_file));
+    };
+    const std::unique_ptr<PointStore> store = JoinPoints({.session = state_.name(),
+                                                          .dimension = state_.parameters().dimension(),
+                                                          .files = points_files,
+                                                          .committed = std::move(committed),
+                                                          .next = points_files.back()},
+                                                         open);
+    Add(store->Checksum(0, store->coordinate_count()).status());
   }
 
   void CheckFeatures() {
@@ -78,14 +92,16 @@ class SessionCheck {
       return;
     }
     uint64_t segments = 0;
+    uint64_t triangles = 0;
     uint64_t seeds = 0;
     for (const store::v1::StepRecord::Features& step : *features) {
       segments += step.segments().ends_size() / 2;
-      seeds += step.faces().seeds_size();
+      triangles += step.triangles().corners_size() / 3;
+      seeds += step.faces().seeds_size() + step.surface().seeds_size();
     }
-    if (segments != state_.segments() || seeds != state_.seeds()) {
-      Add("there are ", state_.segments(), " segments and ", state_.seeds(), " seeds, and ", segments, " and ", seeds,
-          " in its steps");
+    if (segments != state_.segments() || triangles != state_.triangles() || seeds != state_.seeds()) {
+      Add("there are ", state_.segments(), " segments, ", state_.triangles(), " triangles and ", state_.seeds(),
+          " seeds, and ", segments, ", ", triangles, " and ", seeds, " in its steps");
     }
   }
 
@@ -130,7 +146,7 @@ class SessionCheck {
 
   void CheckMesh() {
     if (state_.has_mesh()) {
-      const std::string path = paths_.mesh(state_.name(), state_.mesh().revision());
+      const std::string path = paths_.mesh(state_.name(), state_.mesh().revision(), state_.mesh().epoch());
       const auto in_use = std::make_shared<FilesInUse>(files_);
       Add(MeshFile(files_, state_.mesh(), in_use->Take(path, /*is_written=*/false)).Check());
     }
@@ -147,11 +163,12 @@ class SessionCheck {
 // Whether a server has changed, or deleted, the session since it was read.
 bool HasChanged(SessionTables& tables, const store::v1::SessionRecord& state) {
   const auto now = tables.ReadState(state.name());
-  // Bytes of records with labels may differ; what a problem may be about is in these fields.
+  // Bytes of records with labels may differ; these are the fields that a problem may be about.
   return now.ok() &&
          (!now->has_value() || (*now)->revision() != state.revision() || (*now)->points() != state.points() ||
-          (*now)->segments() != state.segments() || (*now)->next_operation() != state.next_operation() ||
-          (*now)->sizes() != state.sizes() || (*now)->mesh().revision() != state.mesh().revision());
+          (*now)->segments() != state.segments() || (*now)->triangles() != state.triangles() ||
+          (*now)->next_operation() != state.next_operation() || (*now)->sizes() != state.sizes() ||
+          (*now)->mesh().revision() != state.mesh().revision() || (*now)->mesh().epoch() != state.mesh().epoch());
 }
 
 void Count(const StoredSessions& stored, DataReport& report) {

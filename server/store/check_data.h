@@ -18,8 +18,8 @@ struct CheckDataOptions {
 };
 
 struct DataReport {
-  std::vector<std::string> problems;  // each names a file, and what is wrong with it
-  std::vector<std::string> unknown;   // paths of what is in the folder and not ours
+  std::vector<std::string> problems;  // each names a file, and its damage
+  std::vector<std::string> unknown;   // paths of other files in the folder
   uint64_t sessions = 0;
   uint64_t steps = 0;  // those of features excepted
   uint64_t operations = 0;
@@ -33,7 +33,7 @@ struct DataReport {
 
 // Checks schema, database, write-ahead log, every record, and every byte of points and meshes that a session names.
 // Changes nothing but for sessions.db-shm beside the database, which SQLite needs to read it. A server may serve the
-// folder meanwhile: what it changes is looked at once more, as it is then.
+// folder meanwhile: a session that it changes is checked once more, as it is then.
 //
 // Complexity: O(bytes).
 // Errors:     the folder cannot be read at all: those of SessionTables::Open, and of a FileSystem.

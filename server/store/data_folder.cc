@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::string_view kPrefix = "sessions/";
 constexpr std::string_view kPoints = ".points";
-constexpr std::string_view kMesh = ".mesh-";
+constexpr std::string_view kMesh = ".mesh";
 
 constexpr std::string_view kHexDigits = "0123456789abcdef";
 constexpr std::string_view kDigits = "0123456789";
@@ -37,7 +37,7 @@ bool HasOnly(std::string_view text, std::string_view digits) {
   return !text.empty() && text.find_first_not_of(digits) == std::string_view::npos;
 }
 
-// What the names of a session's files begin with: the digits of its name; of a name that is not as the server gives
+// The beginning of the names of a session's files: the digits of its name; of a name that is not as the server gives
 // them, all of it in hexadecimal behind an x.
 std::string StemOf(const std::string& session) {
   if (session.starts_with(kPrefix)) {
@@ -59,43 +59,48 @@ absl::Status WithAdvice(const absl::Status& status) {
 
 }  // namespace
 
-std::string DataPaths::points(const std::string& session, uint64_t number) const {
+std::string DataPaths::points(const std::string& session, const store::v1::PointsFile& file) const {
   const std::string first = absl::StrCat(files(), "/", StemOf(session), std::string(kPoints));
-  return number == 0 ? first : absl::StrCat(first, "-", number);
+  const std::string begun = file.number() == 0 && file.epoch() == 0 ? first : absl::StrCat(first, "-", file.number());
+  return file.epoch() == 0 ? begun : absl::StrCat(begun, "-", file.epoch());
 }
 
-std::string DataPaths::mesh(const std::string& session, uint64_t revision) const {
-  return absl::StrCat(files(), "/", StemOf(session), std::string(kMesh), revision);
+std::string DataPaths::mesh(const std::string& session, uint64_t revision, uint64_t epoch) const {
+  const std::string name = absl::StrCat(files(), "/", StemOf(session), std::string(kMesh), "-", revision);
+  return epoch == 0 ? name : absl::StrCat(name, "-", epoch);
 }
 
-bool IsNameOfOurs(const std::string& name) {
+std::optional<uint64_t> EpochOfName(const std::string& name) {
   const size_t dot = name.find('.');
   if (dot == std::string::npos) {
-    return false;
+    return std::nullopt;
   }
   std::string_view stem(name.data(), dot);
   std::string_view end(name.data() + dot, name.size() - dot);
   if (stem.starts_with('x')) {
     stem.remove_prefix(1);
   }
-  if (!HasOnly(stem, kHexDigits)) {
-    return false;
+  const bool is_mesh = end.starts_with(kMesh);
+  if (!HasOnly(stem, kHexDigits) || !(is_mesh || end.starts_with(kPoints))) {
+    return std::nullopt;
   }
-  if (end == kPoints) {
-    return true;
-  }
-  if (end.starts_with(kPoints)) {
-    end.remove_prefix(kPoints.size());
-    return end.starts_with('-') && HasOnly(end.substr(1), kDigits);
-  }
-  if (!end.starts_with(kMesh)) {
-    return false;
-  }
-  end.remove_prefix(kMesh.size());
-  if (end.ends_with(kTemporaryEnd)) {
+  end.remove_prefix((is_mesh ? kMesh : kPoints).size());
+  if (is_mesh && end.ends_with(kTemporaryEnd)) {
     end.remove_suffix(kTemporaryEnd.size());
   }
-  return HasOnly(end, kDigits);
+  // A revision and an epoch, each behind a hyphen.
+  std::vector<uint64_t> numbers;
+  while (end.starts_with('-')) {
+    const std::string digits(end.substr(1, end.find('-', 1) - 1));
+    if (!HasOnly(digits, kDigits) || !absl::SimpleAtoi(digits, &numbers.emplace_back())) {
+      return std::nullopt;
+    }
+    end.remove_prefix(1 + digits.size());
+  }
+  if (!end.empty() || numbers.size() > 2 || (is_mesh && numbers.empty())) {
+    return std::nullopt;
+  }
+  return numbers.size() == 2 ? numbers[1] : 0;
 }
 
 std::optional<absl::Time> FoundAt(const std::string& lost_name) {
@@ -111,11 +116,11 @@ std::optional<absl::Time> FoundAt(const std::string& lost_name) {
 
 std::vector<std::string> FilesOf(const DataPaths& paths, const store::v1::SessionRecord& session) {
   std::vector<std::string> named;
-  if (session.points() > 0) {
-    named.push_back(paths.points(session.name(), session.points_file()));
+  for (const store::v1::PointsFile& file : PointsFilesOf(session)) {
+    named.push_back(paths.points(session.name(), file));
   }
   if (session.has_mesh()) {
-    named.push_back(paths.mesh(session.name(), session.mesh().revision()));
+    named.push_back(paths.mesh(session.name(), session.mesh().revision(), session.mesh().epoch()));
   }
   return named;
 }
@@ -212,11 +217,10 @@ absl::StatusOr<bool> DataFolder::FindDatabase() {
   return true;
 }
 
-absl::StatusOr<Garbage> DataFolder::RemoveGarbage(
-    FilesInUse& in_use, const std::function<absl::StatusOr<std::vector<store::v1::SessionRecord>>()>& read_sessions,
-    absl::Time now) {
+absl::StatusOr<Garbage> DataFolder::RemoveGarbage(FilesInUse& in_use, const std::function<bool(uint64_t epoch)>& is_own,
+                                                  const Files::ReadCensus& read, absl::Time now) {
   WELLSPACE_ASSIGN_OR_RETURN(const std::vector<std::string> names, files_.List(paths_.files()));
-  // Uses keep what is written in these places from now on: only what was there before becomes obsolete.
+  // Uses keep files written in these places from now on: only those there before become obsolete.
   Candidates candidates;
   for (const std::string& name : names) {
     const std::string path = absl::StrCat(paths_.files(), "/", name);
@@ -224,13 +228,17 @@ absl::StatusOr<Garbage> DataFolder::RemoveGarbage(
       candidates.emplace(name, in_use.Take(path, /*is_written=*/false));
     }
   }
-  // After that, so that what has come to be named meanwhile is seen.
-  WELLSPACE_ASSIGN_OR_RETURN(const std::vector<store::v1::SessionRecord> sessions, read_sessions());
-  const auto keep = [&](const std::string& path) { candidates.erase(path.substr(paths_.files().size() + 1)); };
-  for (const store::v1::SessionRecord& session : sessions) {
-    keep(paths_.points(session.name(), session.points_file()));  // points may be on their way
-    keep(paths_.mesh(session.name(), session.mesh().revision()));
+  // After that, so that files that have come to be named meanwhile are seen.
+  WELLSPACE_ASSIGN_OR_RETURN(const Census census, read());
+  for (const store::v1::SessionRecord& session : census.sessions) {
+    for (const std::string& path : FilesOf(paths_, session)) {
+      candidates.erase(path.substr(paths_.files().size() + 1));
+    }
   }
+  std::erase_if(candidates, [&](const auto& candidate) {
+    const uint64_t epoch = EpochOfName(candidate.first).value_or(0);
+    return epoch >= census.oldest_epoch && !is_own(epoch);
+  });
   Garbage sweep;
   WELLSPACE_ASSIGN_OR_RETURN(sweep.set_aside, SetAside(std::move(candidates), now));
   if (has_collected_.exchange(true)) {

@@ -6,9 +6,9 @@
 //   sessions.db-mark  how much of -wal has to be there (LogMark)
 //   ballast           room that is kept for deletions (Ballast)
 //   files/            points and meshes of sessions
-//     ID.points         the points, as they came (PointFile)
-//     ID.points-NUMBER  those that are left since points were removed
-//     ID.mesh-REVISION  the mesh at a revision (MeshFile); with .tmp behind it, one that is being written
+//     ID.points-REVISION-EPOCH  points, as they came (PointFile), begun at a revision by the owner at an epoch
+//     ID.mesh-REVISION-EPOCH    the mesh at a revision (MeshFile); with .tmp behind it, one that is being written
+//                               Of releases without epochs: ID.points, ID.points-REVISION, ID.mesh-REVISION
 //   lost/             files that no session named when they were found; they are kept here for a day
 //     NAME.SECONDS      the name in files/, and when it was found, in seconds since 1970
 #ifndef WELLSPACE_SERVER_STORE_DATA_FOLDER_H_
@@ -28,33 +28,34 @@
 #include "absl/status/statusor.h"
 #include "absl/time/time.h"
 #include "server/store/file_system.h"
+#include "server/store/files.h"
 #include "server/store/files_in_use.h"
-#include "server/store/session_log.h"
 #include "wellspace/store/v1/records.pb.h"
 
 namespace wellspace::server {
 
-// What stands behind the name of a file while it is written.
+// The end of the name of a file while it is written.
 inline constexpr std::string_view kTemporaryEnd = ".tmp";
 
-// Where things are in the folder `root`.
+// The paths of files in the folder `root`.
 struct DataPaths {
   std::string root;
 
   std::string lock() const { return root + "/lock"; }
-  // Held by a back-up, as files() is: what rows name, or have named, stays meanwhile.
+  // Held by a back-up, as files() is: files that rows name, or have named, stay meanwhile.
   std::string back_up_lock() const { return root + "/back-up.lock"; }
   std::string database() const { return root + "/sessions.db"; }
   std::string ballast() const { return root + "/ballast"; }
   std::string files() const { return root + "/files"; }
   std::string lost() const { return root + "/lost"; }
-  // `session`: its name. `number`: that of its points file (SessionRecord.points_file).
-  std::string points(const std::string& session, uint64_t number) const;
-  std::string mesh(const std::string& session, uint64_t revision) const;
+  // `session`: its name.
+  std::string points(const std::string& session, const store::v1::PointsFile& file) const;
+  std::string mesh(const std::string& session, uint64_t revision, uint64_t epoch) const;
 };
 
-// Whether a file in files/ has a name as we give them.
-bool IsNameOfOurs(const std::string& name);
+// The epoch in the name of a file in files/; 0: a name without one. None: the name is not as we give them.
+std::optional<uint64_t> EpochOfName(const std::string& name);
+inline bool IsNameOfOurs(const std::string& name) { return EpochOfName(name).has_value(); }
 // When a file in lost/ was found, by its name. None: the name is not as we give them.
 std::optional<absl::Time> FoundAt(const std::string& lost_name);
 
@@ -71,20 +72,20 @@ class DataFolder {
 
   const DataPaths& paths() const { return paths_; }
 
-  // Looks whether the database is there, and makes an empty one in a new folder. Whether it may be without tables: a
-  // server has not come to its end of making them.
+  // Looks for the database, and makes an empty one in a new folder. True where it may have no tables: it is new, or the
+  // server that made it ended before it had made them.
   //
-  // Errors:     FILE_DAMAGED: it is missing, or empty, and there is what belongs to one. Others of a FileSystem.
+  // Errors:     FILE_DAMAGED: it is missing, or empty, and there are files of one. Others of a FileSystem.
   absl::StatusOr<bool> FindDatabase();
 
-  // Moves files with names of ours to lost/ which are neither in use nor named by a session of those that
-  // `read_sessions` returns. Where a database was lost, or an old one put in its place, they are not lost with it.
+  // Moves files with names of ours to lost/ which no session of the census that `read` makes names, and which no owner
+  // may still have named: they are not in use, and their epoch is this process's, or of an owner that is no more. Where
+  // a database was lost, or an old one put in its place, they are not lost with it.
   // Removes those that have been in lost/ for kKeptLost, but not in the first call: clocks may be wrong at a start.
   //
-  // Errors:     those of `read_sessions`, and of a FileSystem.
-  absl::StatusOr<Garbage> RemoveGarbage(
-      FilesInUse& in_use, const std::function<absl::StatusOr<std::vector<store::v1::SessionRecord>>()>& read_sessions,
-      absl::Time now);
+  // Errors:     those of `read`, and of a FileSystem.
+  absl::StatusOr<Garbage> RemoveGarbage(FilesInUse& in_use, const std::function<bool(uint64_t epoch)>& is_own,
+                                        const Files::ReadCensus& read, absl::Time now);
 
   static constexpr absl::Duration kKeptLost = absl::Hours(24);
 
@@ -106,7 +107,7 @@ class DataFolder {
 // The paths of all files that `session` names, whether they are there or not.
 std::vector<std::string> FilesOf(const DataPaths& paths, const store::v1::SessionRecord& session);
 
-// The paths of what is in the folder besides what belongs there.
+// The paths of files in the folder that do not belong there.
 absl::StatusOr<std::vector<std::string>> FindUnknown(const DataPaths& paths, FileSystem& files);
 
 }  // namespace wellspace::server

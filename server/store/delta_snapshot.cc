@@ -40,7 +40,7 @@ class PartWriter {
     bytes_ = 0;
   }
 
-  // Appends `values` to what `field` gives of a part.
+  // Appends `values` to the array that `field` gives of a part.
   template <typename Values, typename Field>
   void Add(const Values& values, Field field) {
     for (const auto& value : values) {
@@ -101,6 +101,8 @@ void WriteBoundary(const core::MeshDelta& delta, PartWriter& writer) {
   writer.Add(delta.simplex_regions.values, [](Part& part) { return part.mutable_simplex_regions(); });
   writer.AddRuns(delta.kept_facets.runs, [](Part& part) { return part.mutable_kept_facets(); });
   writer.Add(delta.kept_facets.added, [](Part& part) { return part.mutable_facets(); });
+  writer.AddRuns(delta.kept_ridges.runs, [](Part& part) { return part.mutable_kept_ridges(); });
+  writer.Add(delta.kept_ridges.added, [](Part& part) { return part.mutable_ridges(); });
   writer.End();
 }
 
@@ -115,6 +117,7 @@ v1::MeshChecksums ChecksumsOf(const core::Mesh& mesh) {
   checksums.set_vertex_tags(checksum(mesh.vertex_tags));
   checksums.set_simplex_regions(checksum(mesh.simplex_regions));
   checksums.set_facets(checksum(mesh.facets));
+  checksums.set_ridges(checksum(mesh.ridges));
   return checksums;
 }
 
@@ -140,7 +143,7 @@ DeltaSnapshot::DeltaSnapshot(uint64_t base_revision, uint64_t revision, const co
 
 v1::MeshMetadata DeltaSnapshot::Metadata(bool with_boundary) const {
   v1::MeshMetadata metadata;
-  metadata.ParseFromString(metadata_);  // it is what the constructor has made
+  metadata.ParseFromString(metadata_);  // the constructor has made it
   metadata.set_chunk_count(PartCount(with_boundary));
   if (!with_boundary) {
     ClearBoundary(metadata);
@@ -149,6 +152,7 @@ v1::MeshMetadata DeltaSnapshot::Metadata(bool with_boundary) const {
     checksums.clear_vertex_tags();
     checksums.clear_simplex_regions();
     checksums.clear_facets();
+    checksums.clear_ridges();
   }
   return metadata;
 }

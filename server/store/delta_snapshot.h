@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/mesh.h"
-#include "core/mesh_delta.h"
+#include "core/mesh/mesh.h"
+#include "core/mesh/mesh_delta.h"
 #include "grpcpp/support/byte_buffer.h"
 #include "grpcpp/support/slice.h"
 #include "server/base/options.h"
@@ -20,22 +20,22 @@ namespace wellspace::server {
 // The responses that bring it, ready to be sent. Immutable: a download holds it for as long as it wants.
 //
 // Thread safety: thread-safe.
-// Invariants: the parts that those who do not ask for the boundary get are the first ones.
+// Invariants: the parts that a download without the boundary gets are the first ones.
 class DeltaSnapshot {
  public:
-  // `delta` is what makes the mesh of revision `base_revision` the mesh `next`, of `revision`. A response has at most
+  // `delta` leads from the mesh of revision `base_revision` to the mesh `next`, of `revision`. A response has at most
   // `max_bytes`.
   DeltaSnapshot(uint64_t base_revision, uint64_t revision, const core::MeshDelta& delta, const core::Mesh& next,
                 uint64_t max_bytes = kMaxResponseBytes);
 
   uint64_t base_revision() const { return base_revision_; }
   uint64_t revision() const { return revision_; }
-  // What it takes in memory.
+  // Its memory, in bytes.
   uint64_t memory_bytes() const { return memory_bytes_; }
-  // Keeps what is reserved for it as long as it lives. To be called once, before others know it.
+  // Keeps the reservation of its memory as long as it lives. To be called once, before others know it.
   void KeepMemory(MemoryReservation memory) { memory_ = std::move(memory); }
 
-  // What is sent ahead of the parts, their number and the checksums included.
+  // The message that is sent ahead of the parts; their number and the checksums are in it.
   v1::MeshMetadata Metadata(bool with_boundary) const;
   uint64_t PartCount(bool with_boundary) const { return with_boundary ? parts_.size() : plain_parts_; }
 

@@ -29,7 +29,7 @@ class File {
   virtual absl::Status WriteAt(uint64_t offset, std::span<const char> bytes) = 0;
   virtual absl::Status Truncate(uint64_t size) = 0;
   virtual absl::StatusOr<uint64_t> Size() const = 0;
-  // Bytes and size outlive a loss of power from now on. After an error it is not known what is on the disk.
+  // Bytes and size outlive a loss of power from now on. After an error the contents of the disk are not known.
   virtual absl::Status Synchronize() = 0;
 };
 
@@ -79,7 +79,7 @@ class FileSystem {
   virtual absl::StatusOr<std::unique_ptr<FileLock>> LockFolder(const std::string& folder) = 0;
   // Locks the file, which is made if it is not there yet, and writes the number of this process into it.
   //
-  // Errors:     ABORTED: it is locked already; the message is what the holder has written.
+  // Errors:     ABORTED: it is locked already; the message is the text that the holder has written.
   virtual absl::StatusOr<std::unique_ptr<FileLock>> Lock(const std::string& path) = 0;
 };
 

@@ -1,4 +1,4 @@
-// Which files are read, or are to be named by a row soon, and so must stay.
+// The files that are read, or are to be named by a row soon, and so must stay.
 #ifndef WELLSPACE_SERVER_STORE_FILES_IN_USE_H_
 #define WELLSPACE_SERVER_STORE_FILES_IN_USE_H_
 
@@ -57,7 +57,7 @@ class FilesInUse : public std::enable_shared_from_this<FilesInUse> {
     uint64_t uses = 0;
     uint64_t version = 0;  // grows with each file that is written in this place
     bool is_obsolete = false;
-    std::string set_aside{};  // what its name is then; empty: it is removed
+    std::string set_aside{};  // its name then; empty: it is removed
   };
 
   void RemoveNow(const std::string& path, const std::string& set_aside = "");

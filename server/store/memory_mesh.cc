@@ -23,18 +23,20 @@ absl::StatusOr<core::HugeVector<T>> Copy(const core::HugeVector<T>& values, cons
   return copy;
 }
 
-MeshSnapshot::Figures FiguresOf(uint64_t revision, const core::Mesh& mesh) {
-  return {.revision = revision,
-          .vertices = mesh.vertex_count(),
-          .simplices = mesh.simplex_count(),
-          .domain_low = mesh.domain_low,
-          .domain_high = mesh.domain_high};
-}
-
 }  // namespace
 
+store::v1::MeshRecord RecordOf(uint64_t revision, const core::Mesh& mesh) {
+  store::v1::MeshRecord record;
+  record.set_revision(revision);
+  record.set_vertices(mesh.vertex_count());
+  record.set_simplices(mesh.simplex_count());
+  record.mutable_domain_low()->Assign(mesh.domain_low.begin(), mesh.domain_low.end());
+  record.mutable_domain_high()->Assign(mesh.domain_high.begin(), mesh.domain_high.end());
+  return record;
+}
+
 MemoryMesh::MemoryMesh(uint64_t revision, core::Mesh mesh)
-    : MeshSnapshot(FiguresOf(revision, mesh)), chunks_(std::make_shared<MeshChunks>(std::move(mesh))) {}
+    : MeshSnapshot(RecordOf(revision, mesh)), chunks_(std::make_shared<MeshChunks>(std::move(mesh))) {}
 
 absl::StatusOr<v1::MeshMetadata> MemoryMesh::Metadata(bool with_boundary) const {
   v1::MeshMetadata metadata = MetadataToProto(chunks_->mesh(), chunks_->count(with_boundary), with_boundary);
@@ -69,10 +71,10 @@ absl::StatusOr<core::HugeVector<double>> MemoryMesh::LoadPoints(const core::RunC
 
 absl::Status MemoryMesh::CheckSame(const core::Mesh& made) const {
   const core::Mesh& mesh = chunks_->mesh();
-  const bool is_same = std::ranges::equal(mesh.points, made.points) &&
-                       std::ranges::equal(mesh.simplices, made.simplices) &&
-                       std::ranges::equal(mesh.weights, made.weights) && std::ranges::equal(mesh.facets, made.facets) &&
-                       std::ranges::equal(mesh.simplex_regions, made.simplex_regions);
+  const bool is_same =
+      std::ranges::equal(mesh.points, made.points) && std::ranges::equal(mesh.simplices, made.simplices) &&
+      std::ranges::equal(mesh.weights, made.weights) && std::ranges::equal(mesh.facets, made.facets) &&
+      std::ranges::equal(mesh.ridges, made.ridges) && std::ranges::equal(mesh.simplex_regions, made.simplex_regions);
   return is_same ? absl::OkStatus() : OtherMesh();
 }
 

@@ -14,7 +14,6 @@ class MemoryMesh final : public MeshSnapshot {
  public:
   MemoryMesh(uint64_t revision, core::Mesh mesh);
 
-  std::optional<store::v1::MeshRecord> record() const override { return std::nullopt; }
   uint64_t memory_bytes() const override { return chunks_->memory_bytes(); }
   void KeepMemory(MemoryReservation memory) override { chunks_->KeepMemory(std::move(memory)); }
   void MakeObsolete() override {}

@@ -24,7 +24,7 @@ constexpr uint64_t kEnvelopeBytes = 64;
 // Chunks that a stream holds a copy of: one that is written, one in the buffers of the connection.
 constexpr uint64_t kChunksOnTheirWay = 2;
 
-// What a field of `size` bytes begins with.
+// The tag and the length that a field of `size` bytes begins with.
 std::string TagOf(int field, uint64_t size) {
   std::string tag;
   google::protobuf::io::StringOutputStream stream(&tag);
@@ -58,12 +58,14 @@ std::vector<MeshArray> CutMesh(const core::Mesh& mesh, uint64_t max_bytes) {
   add(v1::MeshChunk::kSimplicesFieldNumber, mesh.simplices, dimension + 1);
   add(v1::MeshChunk::kInputVerticesFieldNumber, mesh.input_vertex, 1);
   add(v1::MeshChunk::kFacetsFieldNumber, mesh.facets, dimension);
+  add(v1::MeshChunk::kRidgesFieldNumber, mesh.ridges, 2);
   return arrays;
 }
 
 bool IsOfBoundary(int field) {
   return field == v1::MeshChunk::kVertexOriginsFieldNumber || field == v1::MeshChunk::kVertexTagsFieldNumber ||
-         field == v1::MeshChunk::kSimplexRegionsFieldNumber || field == v1::MeshChunk::kFacetsFieldNumber;
+         field == v1::MeshChunk::kSimplexRegionsFieldNumber || field == v1::MeshChunk::kFacetsFieldNumber ||
+         field == v1::MeshChunk::kRidgesFieldNumber;
 }
 
 MeshChunks::MeshChunks(core::Mesh mesh, uint64_t max_bytes)
@@ -71,7 +73,8 @@ MeshChunks::MeshChunks(core::Mesh mesh, uint64_t max_bytes)
 
 uint64_t MeshChunks::memory_bytes() const {
   const uint64_t indices = mesh_.simplices.capacity() + mesh_.input_vertex.capacity() +
-                           mesh_.moved_vertices.capacity() + mesh_.vertex_origins.capacity() + mesh_.facets.capacity();
+                           mesh_.moved_vertices.capacity() + mesh_.vertex_origins.capacity() + mesh_.facets.capacity() +
+                           mesh_.ridges.capacity();
   return kChunksOnTheirWay * kMaxResponseBytes + (mesh_.points.capacity() + mesh_.weights.capacity()) * sizeof(double) +
          indices * sizeof(uint32_t) +
          (mesh_.vertex_tags.capacity() + mesh_.simplex_regions.capacity()) * sizeof(int32_t);
@@ -105,7 +108,7 @@ MeshChunks::Chunk MeshChunks::Get(uint64_t index, bool with_boundary) const {
   return chunk;
 }
 
-// The arrays are the last fields of a chunk: what stands before them is small, and they follow as they are.
+// The arrays are the last fields of a chunk: the fields before them are small, and they follow as they are.
 std::string ChunkHead(int field, uint64_t index, uint32_t crc32c, std::span<const uint32_t> moved, int array_field,
                       uint64_t size) {
   v1::MeshChunk message;

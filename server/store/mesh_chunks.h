@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "grpcpp/support/byte_buffer.h"
 #include "server/base/options.h"
 #include "server/jobs/memory_budget.h"
@@ -31,10 +31,10 @@ struct MeshArray {
 // response with a chunk has at most `max_bytes`.
 std::vector<MeshArray> CutMesh(const core::Mesh& mesh, uint64_t max_bytes = kMaxResponseBytes);
 
-// Whether only those who ask for the boundary get this array.
+// Whether only clients that ask for the boundary get this array.
 bool IsOfBoundary(int field);
 
-// How a mesh is cut.
+// The chunks that a mesh is cut into.
 //
 // Thread safety: const functions are thread-safe.
 // Invariants: the same mesh is always cut alike; each chunk fits into a response of kMaxResponseBytes. Who asks for the
@@ -51,9 +51,9 @@ class MeshChunks {
 
   explicit MeshChunks(core::Mesh mesh, uint64_t max_bytes = kMaxResponseBytes);
 
-  // What the mesh takes, and chunks on their way.
+  // Memory of the mesh, and of chunks on their way, in bytes.
   uint64_t memory_bytes() const;
-  // Keeps what is reserved for it as long as the mesh lives.
+  // Keeps the reservation of its memory as long as the mesh lives.
   void KeepMemory(MemoryReservation memory) { memory_ = std::move(memory); }
 
   const core::Mesh& mesh() const { return mesh_; }
@@ -68,7 +68,7 @@ class MeshChunks {
   std::vector<MeshArray> arrays_;  // in the order in which they are sent
 };
 
-// What a response begins with that has nothing but the chunk number `index`, in field `field`: `size` bytes, which are
+// The head of a response that has nothing but the chunk number `index`, in field `field`: `size` bytes, which are
 // the values of the array, follow it as they are. `moved`: those of the vertices of a chunk of points.
 std::string ChunkHead(int field, uint64_t index, uint32_t crc32c, std::span<const uint32_t> moved, int array_field,
                       uint64_t size);

@@ -20,14 +20,6 @@ namespace {
 // Read, and then checked while it is in the nearest cache.
 constexpr uint64_t kReadBytes = uint64_t{1} << 17;
 
-MeshSnapshot::Figures FiguresOf(const store::v1::MeshRecord& record) {
-  return {.revision = record.revision(),
-          .vertices = record.vertices(),
-          .simplices = record.simplices(),
-          .domain_low = {record.domain_low().begin(), record.domain_low().end()},
-          .domain_high = {record.domain_high().begin(), record.domain_high().end()}};
-}
-
 uint64_t BytesOfChunk(const store::v1::MeshDirectory::Array& array, uint64_t chunk) {
   const uint64_t first = chunk * array.rows_per_chunk();
   return std::min(array.rows_per_chunk(), array.rows() - first) * array.row_bytes();
@@ -56,15 +48,11 @@ uint64_t CountChunks(const store::v1::MeshDirectory& directory, bool with_bounda
 
 MeshFile::MeshFile(FileSystem& files, store::v1::MeshRecord record, std::unique_ptr<FilesInUse::Use> use,
                    std::shared_ptr<ChunkBuffers> buffers)
-    : MeshSnapshot(FiguresOf(record)),
-      files_(files),
-      record_(std::move(record)),
-      use_(std::move(use)),
-      buffers_(std::move(buffers)) {}
+    : MeshSnapshot(std::move(record)), files_(files), use_(std::move(use)), buffers_(std::move(buffers)) {}
 
 uint64_t MeshFile::memory_bytes() const {
   // The directory: metadata, and four bytes for each MiB.
-  return 4096 + (record_.size() >> 18);
+  return 4096 + (record().size() >> 18);
 }
 
 absl::Status MeshFile::Damaged(const std::string& what) const {
@@ -86,7 +74,7 @@ absl::Status MeshFile::ReadAll(const File& file, uint64_t offset, std::span<char
   }
   return *count == bytes.size()
              ? absl::OkStatus()
-             : Damaged(absl::StrCat("the file ends at byte ", offset + *count, ", and should have ", record_.size()));
+             : Damaged(absl::StrCat("the file ends at byte ", offset + *count, ", and should have ", record().size()));
 }
 
 absl::StatusOr<std::shared_ptr<const MeshFile::Directory>> MeshFile::directory() const {
@@ -104,8 +92,8 @@ absl::StatusOr<std::shared_ptr<const MeshFile::Directory>> MeshFile::ReadDirecto
     return ErrorOfRead(size.status());
   }
   MeshFooter footer;
-  if (*size != record_.size() || *size < sizeof(footer)) {
-    return Damaged(absl::StrCat("the file has ", *size, " bytes, and should have ", record_.size()));
+  if (*size != record().size() || *size < sizeof(footer)) {
+    return Damaged(absl::StrCat("the file has ", *size, " bytes, and should have ", record().size()));
   }
   WELLSPACE_RETURN_IF_ERROR(ReadAll(*file, *size - sizeof(footer), {reinterpret_cast<char*>(&footer), sizeof(footer)}));
   if (footer.magic != kMeshMagic || footer.directory_bytes > *size - sizeof(footer)) {
@@ -119,7 +107,7 @@ absl::StatusOr<std::shared_ptr<const MeshFile::Directory>> MeshFile::ReadDirecto
   const uint64_t offset = *size - sizeof(footer) - bytes.size();
   WELLSPACE_RETURN_IF_ERROR(ReadAll(*file, offset, bytes));
   const uint32_t checksum = Crc32c(bytes.data(), bytes.size());
-  if (checksum != footer.directory_crc32c || ExtendCrc32c(checksum, &footer, sizeof(footer)) != record_.crc32c()) {
+  if (checksum != footer.directory_crc32c || ExtendCrc32c(checksum, &footer, sizeof(footer)) != record().crc32c()) {
     return Damaged("the directory at the end is not the one that was written");
   }
   auto directory = std::make_shared<Directory>();
@@ -143,9 +131,9 @@ absl::Status MeshFile::CheckDirectory(const Directory& directory, uint64_t size)
     end += array.rows() * array.row_bytes();
   }
   const v1::MeshMetadata& metadata = directory.metadata();
-  const bool is_of_record = end == size && metadata.vertex_count() == record_.vertices() &&
-                            metadata.simplex_count() == record_.simplices() &&
-                            metadata.revision() == record_.revision();
+  const bool is_of_record = end == size && metadata.vertex_count() == record().vertices() &&
+                            metadata.simplex_count() == record().simplices() &&
+                            metadata.revision() == record().revision();
   return is_of_record ? absl::OkStatus() : Damaged("the directory is of another mesh");
 }
 
@@ -255,8 +243,8 @@ absl::StatusOr<core::Mesh> MeshFile::Load(const core::RunContext& context) const
   const v1::MeshMetadata& metadata = whole->metadata();
   core::Mesh mesh;
   mesh.dimension = metadata.dimension();
-  mesh.domain_low = figures().domain_low;
-  mesh.domain_high = figures().domain_high;
+  mesh.domain_low.assign(record().domain_low().begin(), record().domain_low().end());
+  mesh.domain_high.assign(record().domain_high().begin(), record().domain_high().end());
   // The other figures are made anew.
   mesh.statistics.max_radius_edge = metadata.statistics().max_radius_edge();
   mesh.statistics.min_angle_deg = metadata.statistics().min_angle_deg();
@@ -278,6 +266,7 @@ absl::StatusOr<std::shared_ptr<const core::Mesh>> MeshFile::Whole(const core::Ru
   WELLSPACE_RETURN_IF_ERROR(load(Chunk::kSimplexRegionsFieldNumber, mesh->simplex_regions));
   WELLSPACE_RETURN_IF_ERROR(load(Chunk::kInputVerticesFieldNumber, mesh->input_vertex));
   WELLSPACE_RETURN_IF_ERROR(load(Chunk::kFacetsFieldNumber, mesh->facets));
+  WELLSPACE_RETURN_IF_ERROR(load(Chunk::kRidgesFieldNumber, mesh->ridges));
   WELLSPACE_RETURN_IF_ERROR(load(Chunk::kMovedVerticesFieldNumber, mesh->moved_vertices));
   for (const v1::BoundaryPart& part : whole->metadata().boundary()) {
     mesh->boundary.push_back({.tag = part.tag(), .name = part.name(), .facets = part.facet_count()});
@@ -297,15 +286,18 @@ absl::StatusOr<core::HugeVector<double>> MeshFile::LoadPoints(const core::RunCon
 }
 
 absl::Status MeshFile::CheckSame(const core::Mesh& made) const {
-  constexpr std::array kFields = {v1::MeshChunk::kPointsFieldNumber, v1::MeshChunk::kSimplicesFieldNumber,
+  constexpr std::array kFields = {v1::MeshChunk::kPointsFieldNumber,  v1::MeshChunk::kSimplicesFieldNumber,
                                   v1::MeshChunk::kWeightsFieldNumber, v1::MeshChunk::kFacetsFieldNumber,
-                                  v1::MeshChunk::kSimplexRegionsFieldNumber};
+                                  v1::MeshChunk::kRidgesFieldNumber,  v1::MeshChunk::kSimplexRegionsFieldNumber};
   WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<const Directory> whole, directory());
   for (const MeshArray& array : CutMesh(made)) {
     if (std::ranges::find(kFields, array.field) == kFields.end()) {
       continue;
     }
     const Array* written = FindArray(*whole, array.field);
+    if (written == nullptr && array.rows == 0) {
+      continue;  // earlier builds did not know it
+    }
     bool is_same = written != nullptr && written->rows() == array.rows && written->row_bytes() == array.row_bytes;
     const char* data = static_cast<const char*>(array.data);
     for (uint64_t chunk = 0; is_same && chunk < ChunksOf(*written); ++chunk) {

@@ -37,7 +37,6 @@ class MeshFile final : public MeshSnapshot {
   MeshFile(FileSystem& files, store::v1::MeshRecord record, std::unique_ptr<FilesInUse::Use> use,
            std::shared_ptr<ChunkBuffers> buffers = std::make_shared<ChunkBuffers>());
 
-  std::optional<store::v1::MeshRecord> record() const override { return record_; }
   uint64_t memory_bytes() const override;
   void KeepMemory(MemoryReservation memory) override { memory_ = std::move(memory); }
   void MakeObsolete() override { use_->MakeObsolete(); }
@@ -51,7 +50,7 @@ class MeshFile final : public MeshSnapshot {
 
   // Reads all of it.
   //
-  // Errors:     FILE_DAMAGED: what is wrong first.
+  // Errors:     FILE_DAMAGED, naming the first fault.
   absl::Status Check() const;
 
  private:
@@ -76,7 +75,6 @@ class MeshFile final : public MeshSnapshot {
                          Values& values) const;
 
   FileSystem& files_;
-  const store::v1::MeshRecord record_;
   const std::unique_ptr<FilesInUse::Use> use_;
   const std::shared_ptr<ChunkBuffers> buffers_;
   MemoryReservation memory_;

@@ -1,4 +1,4 @@
-// What the writer and the reader of a mesh file have to agree on.
+// The format of mesh files, which their writer and their reader share.
 #ifndef WELLSPACE_SERVER_STORE_MESH_FILE_FORMAT_H_
 #define WELLSPACE_SERVER_STORE_MESH_FILE_FORMAT_H_
 

@@ -4,15 +4,13 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <utility>
-#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "core/base/memory/huge_pages.h"
 #include "core/base/run_context.h"
-#include "core/mesh.h"
+#include "core/mesh/mesh.h"
 #include "grpcpp/support/byte_buffer.h"
 #include "server/jobs/memory_budget.h"
 #include "wellspace/store/v1/records.pb.h"
@@ -26,41 +24,32 @@ namespace wellspace::server {
 // Thread safety: thread-safe.
 class MeshSnapshot {
  public:
-  // What is known of it without any look at its arrays.
-  struct Figures {
-    uint64_t revision = 0;
-    uint64_t vertices = 0;
-    uint64_t simplices = 0;
-    std::vector<double> domain_low{};
-    std::vector<double> domain_high{};
-  };
-
   virtual ~MeshSnapshot() = default;
   MeshSnapshot(const MeshSnapshot&) = delete;
   MeshSnapshot& operator=(const MeshSnapshot&) = delete;
 
-  const Figures& figures() const { return figures_; }
-  uint64_t revision() const { return figures_.revision; }
+  // The record that names the mesh in a SessionRecord: all that is known of it without a look at its arrays.
+  // Of a mesh that is in memory alone the record has
+  // nothing about a file.
+  const store::v1::MeshRecord& record() const { return record_; }
+  uint64_t revision() const { return record_.revision(); }
 
-  // What names it in a SessionRecord; none of one that is in memory alone.
-  virtual std::optional<store::v1::MeshRecord> record() const = 0;
-
-  // What it takes in memory, chunks on their way included.
+  // Its memory, chunks on their way included, in bytes.
   virtual uint64_t memory_bytes() const = 0;
-  // What Load makes takes about as much.
+  // Memory of the mesh that Load makes, in bytes: about as many.
   uint64_t loaded_bytes() const {
-    return LoadedBytes(figures_.domain_low.size(), figures_.vertices, figures_.simplices);
+    return LoadedBytes(record_.domain_low_size(), record_.vertices(), record_.simplices());
   }
   static uint64_t LoadedBytes(uint64_t dimension, uint64_t vertices, uint64_t simplices) {
     return vertices * dimension * sizeof(double) + simplices * (dimension + 1) * sizeof(uint32_t);
   }
-  // Keeps what is reserved for it as long as it lives. To be called once, before others know it.
+  // Keeps the reservation of its memory as long as it lives. To be called once, before others know it.
   virtual void KeepMemory(MemoryReservation memory) = 0;
 
-  // The session has another mesh now: what this has on disk goes with it.
+  // The session has another mesh now: this one's file is removed at the end of its use.
   virtual void MakeObsolete() = 0;
 
-  // What is sent ahead of the chunks, their number and the revision included.
+  // The message that is sent ahead of the chunks; their number and the revision are in it.
   //
   // Errors:     of this and the following: DATA_LOSS, naming the file.
   virtual absl::StatusOr<v1::MeshMetadata> Metadata(bool with_boundary) const = 0;
@@ -72,7 +61,7 @@ class MeshSnapshot {
   // Guarantees: the same bytes whenever it is asked, from memory or from a file.
   virtual absl::StatusOr<grpc::ByteBuffer> SerializeChunk(uint64_t index, int field, bool with_boundary) const = 0;
 
-  // A copy of what core::Mesher::Update needs of it.
+  // A copy of the arrays that core::Mesher::Update needs.
   //
   // Errors:     CANCELLED, DEADLINE_EXCEEDED.
   virtual absl::StatusOr<core::Mesh> Load(const core::RunContext& context) const = 0;
@@ -91,16 +80,19 @@ class MeshSnapshot {
   virtual absl::Status CheckSame(const core::Mesh& made) const = 0;
 
  protected:
-  // What CheckSame says of another mesh.
+  // The error of CheckSame where the meshes differ.
   static absl::Status OtherMesh() {
     return absl::InternalError("the steps of the session make another mesh than they made before");
   }
 
-  explicit MeshSnapshot(Figures figures) : figures_(std::move(figures)) {}
+  explicit MeshSnapshot(store::v1::MeshRecord record) : record_(std::move(record)) {}
 
  private:
-  const Figures figures_;
+  const store::v1::MeshRecord record_;
 };
+
+// The record of `mesh` at `revision`, but for its file.
+store::v1::MeshRecord RecordOf(uint64_t revision, const core::Mesh& mesh);
 
 }  // namespace wellspace::server
 

@@ -99,7 +99,7 @@ absl::Status PointFile::Append(std::span<const double> coordinates) {
 }
 
 void PointFile::Truncate(uint64_t count) {
-  coordinate_count_ = std::min(coordinate_count_, count);  // what is beyond is written over, or cut by the next start
+  coordinate_count_ = std::min(coordinate_count_, count);  // bytes beyond are written over, or cut by the next start
   const std::lock_guard lock(mutex_);
   std::erase_if(pieces_, [&](const Piece& piece) { return piece.end > count; });
 }

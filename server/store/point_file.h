@@ -18,10 +18,10 @@
 namespace wellspace::server {
 
 // A file that grows at its end. Nothing of it is in memory, and a descriptor is kept only from Append to Synchronize:
-// an error of the disk while the kernel writes in between is told to who has the file open, and may be forgotten else.
+// the kernel reports a disk error of a write in between to processes that have the file open, and may forget it else.
 //
 // Thread safety: that of PointStore.
-// Invariants: the bytes of committed coordinates are never written again; what is beyond coordinate_count() is garbage
+// Invariants: the bytes of committed coordinates are never written again; bytes beyond coordinate_count() are garbage
 //             of an upload that broke off.
 class PointFile final : public PointStore {
  public:
@@ -52,7 +52,7 @@ class PointFile final : public PointStore {
   };
   using Take = std::function<absl::Status(std::span<const double> coordinates)>;
 
-  // The file, open, without what was beyond the committed pieces.
+  // The file, open, without bytes beyond the committed pieces.
   absl::StatusOr<std::shared_ptr<File>> OpenToAppend();
   absl::StatusOr<std::unique_ptr<File>> OpenToRead() const;
   // Checks those of the pieces that have some of these coordinates, and were not checked before.
@@ -70,7 +70,7 @@ class PointFile final : public PointStore {
   const std::unique_ptr<FilesInUse::Use> use_;  // or null
   uint64_t committed_count_ = 0;                // coordinates, when this was opened
   uint64_t coordinate_count_ = 0;
-  bool is_cut_ = false;  // what was beyond the committed pieces is gone
+  bool is_cut_ = false;  // bytes beyond the committed pieces are gone
 
   mutable std::mutex mutex_;
   // Guarded by mutex_.

@@ -37,9 +37,9 @@ class PointStore {
   // REQUIRES:   count <= coordinate_count().
   virtual void Truncate(uint64_t count) = 0;
 
-  // What was appended before outlives a loss of power from now on.
+  // Has all appended coordinates outlive a loss of power from now on.
   //
-  // Errors:     UNAVAILABLE: it cannot be known what is on the disk; nothing may be written to it any more.
+  // Errors:     UNAVAILABLE: the contents of the disk are unknown; nothing may be written to it any more.
   virtual absl::Status Synchronize() = 0;
 
   // How many of `coordinates` are, to the bit, those from number `first` on: all, or those before the first that is

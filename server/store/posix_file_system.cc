@@ -53,7 +53,7 @@ absl::Status SystemError(const std::string& path, const char* what) {
   return {CodeOfErrno(error), absl::StrCat(path, ": ", what, ": ", std::strerror(error))};
 }
 
-// Calls again what a signal has interrupted. Not for close, whose descriptor is gone then.
+// Repeats a system call that a signal has interrupted. Not for close, whose descriptor is gone then.
 template <typename Call>
 auto Uninterrupted(const Call& call) {
   auto result = call();
@@ -68,7 +68,7 @@ class Descriptor {
   explicit Descriptor(int number) : number_(number) {}
   ~Descriptor() {
     if (number_ >= 0) {
-      ::close(number_);  // what matters has been synchronised, and its errors told there
+      ::close(number_);  // data that matter were synchronised, and their errors told there
     }
   }
   Descriptor(const Descriptor&) = delete;
@@ -133,7 +133,7 @@ class PosixFile final : public File {
   }
 
   absl::Status Synchronize() override {
-    // Never called again after an error, EINTR excepted: the kernel takes what it could not write for written.
+    // Never called again after an error, EINTR excepted: the kernel takes pages that it could not write for written.
     return Uninterrupted([&] { return ::fdatasync(descriptor_.number()); }) == 0
                ? absl::OkStatus()
                : SystemError(path_, "cannot be synchronised");

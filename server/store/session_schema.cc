@@ -11,10 +11,10 @@
 namespace wellspace::server {
 namespace {
 
-// In the header of the file, by which `file` and we know what it is: "WsSe".
+// In the header of the file, by which `file` and we know its type: "WsSe".
 constexpr int64_t kApplicationId = 0x57735365;
 
-// What makes version n + 1 of version n. A released step is never changed: there are files that it has made.
+// The steps that make version n + 1 of version n. A released step is never changed: there are files that it has made.
 constexpr std::array kMigrations = {
     "CREATE TABLE sessions(id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, state BLOB NOT NULL,"
     "                      crc32c INTEGER NOT NULL);"
@@ -28,6 +28,10 @@ constexpr std::array kMigrations = {
     // number: of the set, of which each row is a part.
     "CREATE TABLE sizes(session INTEGER NOT NULL, number INTEGER NOT NULL, part INTEGER NOT NULL, record BLOB NOT NULL,"
     "                   crc32c INTEGER NOT NULL, PRIMARY KEY(session, number, part)) WITHOUT ROWID;",
+    // A session is at the greater of two epochs: its own, and that of the last owner that has taken everything.
+    "ALTER TABLE sessions ADD COLUMN epoch INTEGER NOT NULL DEFAULT 0;"
+    "CREATE TABLE epochs(id INTEGER PRIMARY KEY CHECK(id = 0), last INTEGER NOT NULL, everything INTEGER NOT NULL,"
+    "                    crc32c INTEGER NOT NULL);",
 };
 
 absl::Status Migrate(SqliteDatabase& database, int64_t version) {
@@ -79,7 +83,7 @@ absl::Status CheckNotEmpty(SqliteDatabase& database, int64_t version, const Sess
                                       "restore a back-up"));
 }
 
-// Looks at every page once, and whether the one index, that of names, has what its table has.
+// Looks at every page once, and whether the one index, that of names, has the rows of its table.
 absl::Status CheckPages(SqliteDatabase& database) {
   WELLSPACE_ASSIGN_OR_RETURN(const std::string answer, database.QueryText("PRAGMA integrity_check(1)"));
   return answer == "ok" ? absl::OkStatus()
@@ -91,8 +95,8 @@ absl::StatusOr<std::unique_ptr<SqliteDatabase>> OpenFile(const std::string& path
                                                          const SessionTablesOptions& options) {
   WELLSPACE_ASSIGN_OR_RETURN(std::unique_ptr<SqliteDatabase> database, SqliteDatabase::Open(path, flags, options.vfs));
   sqlite3_busy_timeout(database->handle(), kBusyMilliseconds);
-  // The mode of locking comes before anything that looks into the file. What is larger than memory, nothing here, goes
-  // to memory all the same: a full disk must not be met where nothing is written.
+  // The mode of locking comes before anything that looks into the file. Temporary tables, none so far, are in
+  // memory: a full disk must not be met where nothing is written.
   WELLSPACE_RETURN_IF_ERROR(database->Execute(absl::StrCat(
       options.is_exclusive ? "PRAGMA locking_mode=EXCLUSIVE;" : "",
       "PRAGMA temp_store=MEMORY;PRAGMA mmap_size=0;PRAGMA cell_size_check=ON;PRAGMA trusted_schema=OFF;"

@@ -12,7 +12,7 @@ namespace wellspace::server {
 
 struct SessionTablesOptions;
 
-// How long a commit waits for another process that has the file locked: a check, or a back-up, as it opens the file.
+// The wait of a commit for another process that has the file locked: a check, or a back-up, as it opens the file.
 inline constexpr int kBusyMilliseconds = 10'000;
 
 // The version of the schema that this program knows.

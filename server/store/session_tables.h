@@ -14,7 +14,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "server/store/file_system.h"
-#include "server/store/session_log.h"
+#include "server/store/records.h"
 #include "server/store/sqlite.h"
 #include "server/store/write_ahead_log.h"
 
@@ -29,7 +29,7 @@ struct SessionTablesOptions {
   int checkpoint_pages = 1000;  // the write-ahead log is taken over into the database when it has as many: 4 MiB
 };
 
-// Each record has a CRC32C beside it, of itself and of what it belongs to: SQLite has none in its pages.
+// Each record has a CRC32C beside it, of itself and of its key: SQLite has none in its pages.
 //
 // Thread safety: thread-safe; one function works at a time.
 // Errors:     of all functions, if not said otherwise: FILE_DAMAGED, naming the file; STORE_FAILED; OUT_OF_MEMORY;
@@ -44,15 +44,26 @@ class SessionTables {
                                                              const SessionTablesOptions& options);
   ~SessionTables();
 
+  // The epoch that the next owner gets.
+  absl::StatusOr<uint64_t> NextEpoch();
+  // Takes all sessions over, at `epoch`: changes of earlier owners are refused from now on.
+  //
+  // REQUIRES:   NextEpoch has returned `epoch`.
+  // Errors:     those of Apply; ABORTED: another has taken it meanwhile.
+  absl::Status TakeAll(uint64_t epoch);
+  // As Records::Take.
+  absl::StatusOr<std::optional<StoredSession>> Take(const std::string& session);
+
   // Applies `changes` in their order, and drops `forgotten`, in one transaction. With Survives::kProcessDeath it may be
   // undone by a loss of power, until another one is committed: of two that follow one another at least one is not.
   //
-  // Errors:     those of SessionLog::Commit, and OUT_OF_MEMORY: nothing has changed. INTERNAL: one of the changes is
-  //             of a session that is not there. STORE_FAILED, FILE_DAMAGED: it is not known what has changed.
+  // Errors:     those of Records::Apply, and OUT_OF_MEMORY: nothing has changed. INTERNAL: one of the changes
+  //             creates a session that is there, or one without a record. STORE_FAILED, FILE_DAMAGED: it is not known
+  //             what has changed.
   absl::Status Apply(std::span<const SessionChange* const> changes, std::span<const AnswerKey> forgotten,
-                     SessionLog::Survives survives);
+                     Survives survives);
 
-  // Has what was committed take up less room, once that is worth it. To be called after Apply, by the same thread.
+  // Has committed changes take up less room, once that is worth it. To be called after Apply, by the same thread.
   //
   // Errors:     DISK_FULL: later, then; STORE_FAILED, FILE_DAMAGED: nothing may be written any more.
   absl::Status Checkpoint();
@@ -64,17 +75,21 @@ class SessionTables {
   // Errors:     those of Checkpoint.
   absl::Status Shrink();
 
-  // All records. With `problems`, damaged records are left out, and what is wrong with each is appended there.
+  // All records. With `problems`, damaged records are left out, and the fault of each is appended there.
   absl::StatusOr<StoredSessions> Load(std::vector<std::string>* problems = nullptr);
 
   absl::StatusOr<std::vector<store::v1::StepRecord::Features>> ReadFeatures(const std::string& session);
   absl::StatusOr<std::vector<StoredSizes>> ReadSizes(const std::string& session);
 
+  // As Records::FindAnswer.
+  absl::StatusOr<std::optional<store::v1::AnswerRecord>> FindAnswer(const AnswerKey& request);
+
   // None: there is no such session.
   absl::StatusOr<std::optional<store::v1::SessionRecord>> ReadState(const std::string& session);
-  absl::StatusOr<std::vector<store::v1::SessionRecord>> ReadStates();
+  // Of all sessions. `*everything`, if not null, is the epoch of the last owner that has taken all.
+  absl::StatusOr<std::vector<store::v1::SessionRecord>> ReadStates(uint64_t* everything = nullptr);
 
-  // What is wrong with the file itself, by SQLite's thorough look at it; nothing: it is whole.
+  // The faults of the file itself, by PRAGMA integrity_check; none: it is whole.
   absl::StatusOr<std::vector<std::string>> CheckFile();
 
   // Copies all to the new file `path`, as it is at one moment.
@@ -84,6 +99,16 @@ class SessionTables {
 
  private:
   struct Statements;
+  struct Epochs {
+    int64_t last = 0;        // that any owner has got
+    int64_t everything = 0;  // that of the last owner that has taken all
+  };
+  // The place of a session in the tables.
+  struct Row {
+    std::optional<int64_t> id{};  // none: it is not there
+    int64_t own_epoch = 0;        // of the row
+    int64_t epoch = 0;            // at which the session is; of one that is not there, that of everything
+  };
 
   SessionTables(std::unique_ptr<SqliteDatabase> database, int checkpoint_pages);
   absl::Status Prepare();
@@ -96,20 +121,30 @@ class SessionTables {
   absl::Status SetMark();
   // To be called once all `frames` of the write-ahead log are in the database, before SQLite begins it anew.
   absl::Status MarkAsTaken(int frames);
+  // The following want mutex_ to be held. Runs `write` in a transaction.
+  absl::Status Transact(Survives survives, const std::function<absl::Status()>& write);
+  absl::StatusOr<Epochs> ReadEpochs();
+  absl::Status WriteEpochs(const Epochs& epochs);
   absl::Status ApplyOne(const SessionChange& change);
-  absl::Status Delete(const std::string& session);
-  absl::Status Write(const SessionChange& change);
+  absl::Status Delete(int64_t id);
+  absl::Status Write(const SessionChange& change, const Row& row);
   absl::Status WriteSteps(int64_t session, const std::vector<store::v1::StepRecord>& steps);
   absl::Status WriteOperations(int64_t session, const SessionChange& change);
   absl::Status WriteSizes(int64_t session, const SessionChange& change);
   absl::Status WriteAnswer(const store::v1::AnswerRecord& answer);
+  absl::StatusOr<Row> Find(const std::string& session);
   absl::StatusOr<std::optional<int64_t>> FindId(const std::string& session);
-  absl::Status SetSurvives(SessionLog::Survives survives);
+  // The record and the epoch of its row; `*id` is the row's.
+  absl::StatusOr<std::optional<StoredSession>> ReadOne(const std::string& session, int64_t* id);
+  // The checksum of the session's record in a row of this epoch.
+  absl::StatusOr<uint64_t> ChecksumAt(const std::string& session, int64_t epoch);
+  absl::Status SetSurvives(Survives survives);
 
-  // Calls `take` with each row of `statement`; what it says is wrong is an error, or goes into `problems`.
+  // Calls `take` with each row of `statement`. A fault that it returns is an error, or goes into `problems`.
   absl::Status ForEach(SqliteStatement& statement, std::vector<std::string>* problems,
                        const std::function<std::string(const SqliteStatement& row)>& take);
-  absl::Status LoadSteps(std::span<StoredSession> sessions, std::span<const int64_t> ids,
+  // Of all sessions, or of the one that there is.
+  absl::Status LoadSteps(std::span<StoredSession> sessions, std::span<const int64_t> ids, bool is_of_one,
                          std::vector<std::string>* problems);
   absl::Status LoadAnswers(std::vector<store::v1::AnswerRecord>& answers, std::vector<std::string>* problems);
 
@@ -119,8 +154,8 @@ class SessionTables {
   std::unique_ptr<Statements> statements_;
   std::unique_ptr<LogMark> mark_;  // may be null
   int untold_frames_ = 0;  // are in the database, which the mark has to say before anything is committed; 0: none
-  SessionLog::Survives survives_ = SessionLog::Survives::kPowerLoss;  // of what is committed now
-  bool has_unsynchronised_commit_ = false;                            // the last one
+  Survives survives_ = Survives::kPowerLoss;  // of the commit under way
+  bool has_unsynchronised_commit_ = false;    // the last one
   // The write-ahead log may have bytes that are not on the disk, though they can be read: nothing may be committed
   // behind them.
   bool has_doubtful_log_ = false;

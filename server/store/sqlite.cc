@@ -16,8 +16,8 @@ bool IsForWantOfRoom(int error) {
   return error == ENOSPC || error == EDQUOT || error == EFBIG || error == EMFILE || error == ENFILE;
 }
 
-// Whether a failure of this kind leaves what is on the disk known, unlike those to synchronise: SQLite takes the
-// transaction back, as when it is full, which is what it calls ENOSPC alone.
+// Whether a failure of this kind leaves the contents of the disk known, unlike those to synchronise: SQLite takes the
+// transaction back, as when it is full, by which it means ENOSPC alone.
 bool IsOfWriteOrOpen(int code) {
   switch (code) {
     case SQLITE_IOERR_WRITE:
@@ -55,7 +55,7 @@ v1::ErrorReason ReasonOf(int code, int error) {
   }
 }
 
-// What has happened, and what is to be done about it, where SQLite's own words do not say it.
+// The cause of an error, and the advice for it, where SQLite's own words do not give them.
 std::string ExplanationOf(int code, int error, const char* words) {
   if ((code & 0xff) == SQLITE_CANTOPEN && error == ENOENT) {
     return "the database is missing";
@@ -110,7 +110,7 @@ SqliteDatabase::~SqliteDatabase() { sqlite3_close_v2(handle_); }
 
 absl::Status SqliteDatabase::ErrorOf(int code) const {
   const int last_error = errno;
-  // Of a commit SQLite does not note it; then it is what the thread's last call of the system has left.
+  // Of a commit SQLite does not note it; then it is the one that the thread's last system call has left.
   const int noted = sqlite3_system_errno(handle_);
   const int error = noted == 0 && IsOfWriteOrOpen(code) ? last_error : noted;
   const v1::ErrorReason reason = ReasonOf(code, error);
@@ -144,7 +144,7 @@ absl::StatusOr<int64_t> SqliteDatabase::QueryNumber(const std::string& query) {
   WELLSPACE_ASSIGN_OR_RETURN(SqliteStatement statement, Prepare(query));
   WELLSPACE_RETURN_IF_ERROR(statement.Step().status());
   const int64_t number = statement.Number(0);
-  WELLSPACE_RETURN_IF_ERROR(statement.Step().status());  // what it changes is committed by this step, or is not
+  WELLSPACE_RETURN_IF_ERROR(statement.Step().status());  // its change is committed by this step, or is not
   return number;
 }
 

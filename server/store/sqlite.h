@@ -76,6 +76,7 @@ class SqliteStatement {
   void Reset();
 
   int64_t Number(int column) const { return sqlite3_column_int64(statement_.get(), column); }
+  bool IsNull(int column) const { return sqlite3_column_type(statement_.get(), column) == SQLITE_NULL; }
   // Lives until the next step.
   std::string_view Bytes(int column) const;
 

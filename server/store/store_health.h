@@ -1,4 +1,4 @@
-// Whether the store can still write, and what its errors are to clients.
+// The health of the store: whether it can still write, and its errors for clients.
 #ifndef WELLSPACE_SERVER_STORE_STORE_HEALTH_H_
 #define WELLSPACE_SERVER_STORE_STORE_HEALTH_H_
 
@@ -11,7 +11,7 @@
 
 namespace wellspace::server {
 
-// Remembers the first failure after which it is not known what is on the disk. Nothing is written from then on: the
+// Remembers the first failure after which the contents of the disk are unknown. Nothing is written from then on: the
 // kernel takes pages that it could not write for written, so that trying again would succeed without a reason.
 //
 // Thread safety: thread-safe.
@@ -24,19 +24,19 @@ class StoreHealth {
   // Errors:     STORE_FAILED, after a failure.
   absl::Status Check() const;
 
-  // To be called before what takes up room on the disk.
+  // To be called before a change that takes up room on the disk.
   //
-  // Errors:     STORE_FAILED, after a failure; DISK_FULL, as long as what is left is kept for deletions.
+  // Errors:     STORE_FAILED, after a failure; DISK_FULL, as long as the room left is kept for deletions.
   absl::Status CheckRoom();
 
   // Notes the failure. Returns STORE_FAILED.
   absl::Status Fail(const absl::Status& cause);
 
-  // What the opening of a file that is to be written to is to clients, if it ended with `cause`: where it may not be
-  // written to, nothing is doubtful, and others can go on.
+  // The error for clients if a file could not be opened for writing because of `cause`: where writing is not
+  // permitted, nothing is doubtful, and others can go on.
   absl::Status OfOpen(const absl::Status& cause);
 
-  // What a write, or another change of a file, that ended with `cause` is to clients: DISK_FULL, or a failure.
+  // The error for clients if a write, or another change of a file, ended with `cause`: DISK_FULL, or a failure.
   absl::Status OfWrite(const absl::Status& cause);
 
  private:
@@ -46,7 +46,7 @@ class StoreHealth {
   absl::Status cause_;  // guarded by mutex_; ok: none yet
 };
 
-// What a read that ended with `cause`, an error of a FileSystem, is to clients: FILE_DAMAGED, OUT_OF_MEMORY, or, where
+// The error for clients if a read ended with `cause`, an error of a FileSystem: FILE_DAMAGED, OUT_OF_MEMORY, or, where
 // the server may not read the file, STORE_FAILED.
 absl::Status ErrorOfRead(const absl::Status& cause);
 

@@ -119,11 +119,11 @@ class LogWalk {
   std::vector<char> frame_;
   uint64_t number_ = 0;
   LogChecksum before_;         // of the frames that are whole
-  LogChecksum stored_before_;  // what the frame before says
+  LogChecksum stored_before_;  // as the frame before has it
   LogChecksum stored_ = before_;
 };
 
-// What is wrong with the log's end, of which the frame that the walk is at is bad.
+// The damage at the end of the log, where the walk is at a bad frame; empty: a write was torn.
 absl::StatusOr<std::string> LookBehind(LogWalk& walk) {
   const uint64_t bad = walk.number();
   int commits = 0;
@@ -164,7 +164,7 @@ absl::StatusOr<std::string> LookAtFrames(const File& file, const LogHeader& head
   }
 }
 
-// What is wrong with the log, by the mark that there is.
+// The damage of the log, by the mark that there is; empty: there is none.
 absl::StatusOr<std::string> LookAtLog(FileSystem& files, const std::string& database,
                                       const std::optional<LogPosition>& mark) {
   const uint32_t needed = mark.has_value() && !mark->is_in_database ? mark->frames : 0;

@@ -47,7 +47,7 @@ class LogMark {
   // Errors:     of this and the following: those of a FileSystem.
   static absl::StatusOr<std::unique_ptr<LogMark>> Open(FileSystem& files, const std::string& database);
 
-  // The mark that is there. None: there is no such file, or what is in it is no mark.
+  // The mark that is there. None: there is no such file, or its contents are no mark.
   static absl::StatusOr<std::optional<LogPosition>> Read(FileSystem& files, const std::string& database);
 
   absl::Status Write(const LogPosition& position);
@@ -60,7 +60,7 @@ class LogMark {
   const std::unique_ptr<File> file_;
 };
 
-// Walks the frames of the log of `database`. What is wrong with it, naming the file; nothing: it ends where it was
+// Walks the frames of the log of `database`. Returns its damage, naming the file; empty: the log ends where it was
 // written last, or where a write was torn that no change was acknowledged for.
 //
 // A bad frame is no torn write if the mark has it, or if a frame of the same log stands behind it and behind two

@@ -28,7 +28,7 @@ class MeshWriter {
     return absl::OkStatus();
   }
 
-  // Writes an array, whose place and checksums are what `entry` then has. Errors of the context are in `stopped`.
+  // Writes an array, whose place and checksums `entry` then has. Errors of the context are in `stopped`.
   absl::Status WriteArray(const MeshArray& array, const core::RunContext& context,
                           store::v1::MeshDirectory::Array& entry, absl::Status& stopped) {
     entry.set_field(array.field);
@@ -53,20 +53,10 @@ class MeshWriter {
   uint64_t offset_ = 0;
 };
 
-store::v1::MeshRecord RecordOf(uint64_t revision, const core::Mesh& mesh) {
-  store::v1::MeshRecord record;
-  record.set_revision(revision);
-  record.set_vertices(mesh.vertex_count());
-  record.set_simplices(mesh.simplex_count());
-  record.mutable_domain_low()->Assign(mesh.domain_low.begin(), mesh.domain_low.end());
-  record.mutable_domain_high()->Assign(mesh.domain_high.begin(), mesh.domain_high.end());
-  return record;
-}
-
 // Errors of the file system, or of the context, which are then in `stopped`, too.
 absl::Status WriteAll(File& file, const core::Mesh& mesh, const core::RunContext& context, uint64_t max_chunk_bytes,
                       store::v1::MeshRecord& record, absl::Status& stopped) {
-  WELLSPACE_RETURN_IF_ERROR(file.Truncate(0));  // what a process that died has left in its place
+  WELLSPACE_RETURN_IF_ERROR(file.Truncate(0));  // bytes that a process that died has left in its place
   MeshWriter writer(file);
   store::v1::MeshDirectory directory;
   *directory.mutable_metadata() = MetadataToProto(mesh, 0, /*with_boundary=*/true);
@@ -106,7 +96,7 @@ absl::StatusOr<store::v1::MeshRecord> WriteMeshFile(FileSystem& files, Folder& f
   if (!file.ok()) {
     return health.OfOpen(file.status());
   }
-  // The bytes first, then the name, then the folder that has it: a name never shows what may still be lost.
+  // The bytes first, then the name, then the folder that has it: a name never shows bytes that may still be lost.
   absl::Status written = WriteAll(**file, mesh, context, max_chunk_bytes, record, stopped);
   file->reset();
   if (written.ok()) {

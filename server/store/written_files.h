@@ -1,4 +1,4 @@
-// What the files of a folder that are being written share.
+// The folder of files that are being written, and places for those that are open.
 #ifndef WELLSPACE_SERVER_STORE_WRITTEN_FILES_H_
 #define WELLSPACE_SERVER_STORE_WRITTEN_FILES_H_
 

@@ -7,7 +7,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
-#include "core/domain_parameters.h"
+#include "core/input/domain_parameters.h"
+#include "core/input/space_parameters.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
@@ -25,7 +26,7 @@ std::string DeepestField(const std::string& message, const std::string& field) {
   return is_deeper ? path : field;
 }
 
-// Validates what is set in `parameters` so far, blaming `field`, or a part of it, as the one that was set last.
+// Validates the fields set in `parameters` so far, blaming `field`, or a part of it, as the one that was set last.
 absl::Status Validate(const core::MeshParameters& parameters, const std::string& field) {
   const absl::Status status = core::ValidateParameters(parameters);
   if (status.ok()) {
@@ -35,7 +36,7 @@ absl::Status Validate(const core::MeshParameters& parameters, const std::string&
   return InvalidParameter(message, DeepestField(message, field));
 }
 
-// Refuses a 0 that was sent for what cannot be 0: in the core it would stand for the default.
+// Refuses a 0 that was sent for a field that cannot be 0: in the core it would stand for the default.
 template <typename Number>
 absl::Status RefuseZero(bool is_sent, Number value, const char* field, const char* accepted) {
   return is_sent && value == 0 ? InvalidParameter(absl::StrCat(field, ": 0 is not allowed; expected ", accepted,
@@ -118,6 +119,31 @@ void SetDomain(const core::DomainStatistics& domain, v1::DomainStatistics& messa
   message.set_first_unused_seed(domain.first_unused_seed);
 }
 
+void SetSurface(const core::SurfaceStatistics& surface, v1::SurfaceStatistics& message) {
+  message.set_triangles(surface.triangles);
+  message.set_welded_points(surface.welded_points);
+  message.set_dropped_triangles(surface.dropped_triangles);
+  message.set_flipped_triangles(surface.flipped_triangles);
+  message.set_unmeshed_points(surface.unmeshed_points);
+  message.set_patches(surface.patches);
+  message.set_curves(surface.curves);
+  message.set_corners(surface.corners);
+  message.set_solids(surface.solids);
+  message.set_facets(surface.facets);
+  message.set_ridges(surface.ridges);
+  message.set_lost_ridges(surface.lost_ridges);
+  message.set_exempt_simplices(surface.exempt_simplices);
+  message.set_acute_curves(surface.acute_curves);
+  message.set_tube_simplices(surface.tube_simplices);
+  message.set_min_angle_outside_deg(surface.min_angle_outside_deg);
+  message.set_unused_seeds(surface.unused_seeds);
+  message.set_first_unused_seed(surface.first_unused_seed);
+  message.set_min_facet_angle_deg(surface.min_facet_angle_deg);
+  message.set_deviation_of_facets(surface.deviation_of_facets);
+  message.set_deviation_of_surface(surface.deviation_of_surface);
+  message.mutable_volumes()->Assign(surface.volumes.begin(), surface.volumes.end());
+}
+
 v1::MeshStatistics StatisticsToProto(const core::MeshStatistics& statistics) {
   v1::MeshStatistics message;
   message.set_input_points(statistics.input_points);
@@ -125,6 +151,9 @@ v1::MeshStatistics StatisticsToProto(const core::MeshStatistics& statistics) {
   message.set_merged_points(statistics.merged_points);
   if (statistics.domain.has_value()) {
     SetDomain(*statistics.domain, *message.mutable_domain());
+  }
+  if (statistics.surface.has_value()) {
+    SetSurface(*statistics.surface, *message.mutable_surface());
   }
   message.set_vertices(statistics.vertices);
   message.set_simplices(statistics.simplices);
@@ -166,6 +195,51 @@ v1::MeshStatistics StatisticsToProto(const core::MeshStatistics& statistics) {
   counters->set_exact_predicates(statistics.exact_predicates);
   counters->set_perturbed_predicates(statistics.perturbed_predicates);
   return message;
+}
+
+// Translates and validates the demands on the surface.
+absl::Status TakeSurface(const v1::SurfaceParameters& message, core::MeshParameters& parameters) {
+  core::SurfaceParameters& surface = parameters.surface;
+  const auto take = [&parameters](bool is_sent, double value, const char* field, double& into) -> absl::Status {
+    WELLSPACE_RETURN_IF_ERROR(RefuseZero(is_sent, value, field, "a number above 0"));
+    into = value;
+    return Validate(parameters, field);
+  };
+  WELLSPACE_RETURN_IF_ERROR(take(message.has_tolerance(), message.tolerance(), "surface.tolerance", surface.tolerance));
+  if (message.has_min_facet_angle()) {
+    surface.min_facet_angle = message.min_facet_angle();
+    WELLSPACE_RETURN_IF_ERROR(Validate(parameters, "surface.min_facet_angle"));
+  }
+  WELLSPACE_RETURN_IF_ERROR(
+      take(message.has_edge_length(), message.edge_length(), "surface.edge_length", surface.edge_length));
+  WELLSPACE_RETURN_IF_ERROR(take(message.has_min_size(), message.min_size(), "surface.min_size", surface.min_size));
+  WELLSPACE_RETURN_IF_ERROR(
+      take(message.has_outside_rho(), message.outside_rho(), "surface.outside_rho", surface.outside_rho));
+  WELLSPACE_RETURN_IF_ERROR(take(message.has_curvature_elements(), message.curvature_elements(),
+                                 "surface.curvature_elements", surface.curvature_elements));
+  return take(message.has_thickness_layers(), message.thickness_layers(), "surface.thickness_layers",
+              surface.thickness_layers);
+}
+
+void SetSurface(const core::SurfaceParameters& surface, v1::MeshParameters& message) {
+  if (surface == core::SurfaceParameters()) {
+    return;
+  }
+  v1::SurfaceParameters& part = *message.mutable_surface();
+  const auto set = [&part](double value, auto setter) {
+    if (value != 0) {
+      (part.*setter)(value);
+    }
+  };
+  set(surface.tolerance, &v1::SurfaceParameters::set_tolerance);
+  if (surface.min_facet_angle.has_value()) {
+    part.set_min_facet_angle(*surface.min_facet_angle);
+  }
+  set(surface.edge_length, &v1::SurfaceParameters::set_edge_length);
+  set(surface.min_size, &v1::SurfaceParameters::set_min_size);
+  set(surface.outside_rho, &v1::SurfaceParameters::set_outside_rho);
+  set(surface.curvature_elements, &v1::SurfaceParameters::set_curvature_elements);
+  set(surface.thickness_layers, &v1::SurfaceParameters::set_thickness_layers);
 }
 
 }  // namespace
@@ -225,6 +299,7 @@ absl::StatusOr<core::MeshParameters> ParametersFromProto(const v1::MeshParameter
   WELLSPACE_RETURN_IF_ERROR(Validate(parameters, "pump_weights"));
   parameters.merge_distance = message.merge_distance();
   WELLSPACE_RETURN_IF_ERROR(Validate(parameters, "merge_distance"));
+  WELLSPACE_RETURN_IF_ERROR(TakeSurface(message.surface(), parameters));
   if (message.has_threads()) {
     parameters.threads = message.threads();
     WELLSPACE_RETURN_IF_ERROR(Validate(parameters, "threads"));
@@ -241,11 +316,14 @@ absl::StatusOr<core::MeshParameters> ParametersFromProto(const v1::MeshParameter
   return parameters;
 }
 
-absl::Status ValidateFor(const std::optional<core::Features>& features, const core::MeshParameters& parameters) {
-  if (!features.has_value()) {
-    return absl::OkStatus();
+absl::Status ValidateFor(const core::Input& input, const core::MeshParameters& parameters) {
+  if (!input.surface.has_value() && parameters.surface != core::SurfaceParameters()) {
+    return InvalidParameter("surface: there are no triangles that it could be about; send some, or leave it out",
+                            "surface");
   }
-  const absl::Status status = core::ValidateDomainParameters(parameters, *features);
+  const absl::Status status = input.features.has_value()  ? core::ValidateDomainParameters(parameters, *input.features)
+                              : input.surface.has_value() ? core::ValidateSpaceParameters(parameters, *input.surface)
+                                                          : absl::OkStatus();
   if (status.ok()) {
     return status;
   }
@@ -299,6 +377,7 @@ v1::MeshParameters ParametersToProto(const core::MeshParameters& parameters) {
     message.set_merge_distance(parameters.merge_distance);
   }
   message.set_keep_vertices(parameters.keep_vertices);
+  SetSurface(parameters.surface, message);
   if (parameters.max_vertices != 0) {
     message.set_max_vertices(parameters.max_vertices);
   }
@@ -340,6 +419,7 @@ v1::MeshMetadata MetadataToProto(const core::Mesh& mesh, uint64_t chunk_count, b
   }
   metadata.set_has_simplex_regions(!mesh.simplex_regions.empty());
   metadata.set_has_vertex_marks(!mesh.vertex_tags.empty());
+  metadata.set_ridge_count(mesh.ridges.size() / 2);
   if (!with_boundary) {
     ClearBoundary(metadata);
   }
@@ -352,6 +432,7 @@ void ClearBoundary(v1::MeshMetadata& metadata) {
   metadata.clear_regions();
   metadata.clear_has_simplex_regions();
   metadata.clear_has_vertex_marks();
+  metadata.clear_ridge_count();
 }
 
 v1::EstimateMeshResponse EstimateToProto(const core::MeshEstimate& estimate) {

@@ -3,11 +3,10 @@
 #define WELLSPACE_SERVER_WIRE_CONVERT_H_
 
 #include <cstdint>
-#include <optional>
 
 #include "absl/status/statusor.h"
 #include "absl/time/time.h"
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "google/protobuf/duration.pb.h"
 #include "google/protobuf/timestamp.pb.h"
 #include "server/base/options.h"
@@ -26,11 +25,11 @@ absl::StatusOr<core::MeshParameters> ParametersFromProto(const v1::MeshParameter
 // Those that ParametersToProto has made, whatever the limits of the server are now.
 absl::StatusOr<core::MeshParameters> ParametersFromRecord(const v1::MeshParameters& message);
 
-// Refuses valid parameters that points with `features`, if there are any, do not have; see
-// core::ValidateDomainParameters.
+// Refuses valid parameters that such an input does not have; see core::ValidateDomainParameters and
+// core::ValidateSpaceParameters. Its points are not looked at.
 //
 // Errors:     INVALID_PARAMETERS with the path of the first wrong field.
-absl::Status ValidateFor(const std::optional<core::Features>& features, const core::MeshParameters& parameters);
+absl::Status ValidateFor(const core::Input& input, const core::MeshParameters& parameters);
 
 // The parameters with every default that does not depend on points filled in.
 v1::MeshParameters ParametersToProto(const core::MeshParameters& parameters);
@@ -39,7 +38,7 @@ google::protobuf::Timestamp TimeToProto(absl::Time time);
 
 // The metadata of `mesh`, to be followed by `chunk_count` chunks. `with_boundary`: as the request says.
 v1::MeshMetadata MetadataToProto(const core::Mesh& mesh, uint64_t chunk_count, bool with_boundary = false);
-// Leaves of metadata with boundary what there is without.
+// Reduces metadata with boundary to those without.
 void ClearBoundary(v1::MeshMetadata& metadata);
 
 v1::EstimateMeshResponse EstimateToProto(const core::MeshEstimate& estimate);

@@ -8,7 +8,7 @@
 #include "absl/strings/cord.h"
 #include "absl/strings/str_cat.h"
 #include "absl/types/optional.h"
-#include "core/mesh_parameters.h"
+#include "core/input/mesh_parameters.h"
 #include "google/rpc/error_details.pb.h"
 #include "server/log/log_fields.h"
 #include "server/wire/hidden_folders.h"
@@ -18,7 +18,7 @@ namespace {
 
 constexpr int kRetrySeconds = 1;
 
-// A message may repeat what the client sent. It goes out three times, as trailing metadata, of which clients take 8
+// A message may repeat text of the client. It goes out three times, as trailing metadata, of which clients take 8
 // KiB.
 constexpr size_t kMaxErrorMessageBytes = 1024;
 
@@ -38,6 +38,7 @@ absl::StatusCode CodeOf(v1::ErrorReason reason) {
     case v1::ERROR_REASON_INVALID_CHUNK_SHAPE:
     case v1::ERROR_REASON_INVALID_POINTS:
     case v1::ERROR_REASON_INVALID_SEGMENTS:
+    case v1::ERROR_REASON_INVALID_TRIANGLES:
     case v1::ERROR_REASON_INVALID_SIZES:
     case v1::ERROR_REASON_MALFORMED_REQUEST:
     case v1::ERROR_REASON_REQUEST_ID_REUSED:
@@ -56,6 +57,7 @@ absl::StatusCode CodeOf(v1::ErrorReason reason) {
       return absl::StatusCode::kResourceExhausted;
     case v1::ERROR_REASON_SERVER_STOPPING:
     case v1::ERROR_REASON_STORE_FAILED:
+    case v1::ERROR_REASON_SESSION_ELSEWHERE:
       return absl::StatusCode::kUnavailable;
     case v1::ERROR_REASON_FILE_DAMAGED:
       return absl::StatusCode::kDataLoss;
@@ -88,7 +90,8 @@ absl::StatusCode CodeOf(v1::ErrorReason reason) {
 bool PassesWithTime(v1::ErrorReason reason) {
   return reason == v1::ERROR_REASON_QUEUE_FULL || reason == v1::ERROR_REASON_OUT_OF_MEMORY ||
          reason == v1::ERROR_REASON_QUOTA_EXCEEDED || reason == v1::ERROR_REASON_SERVER_STOPPING ||
-         reason == v1::ERROR_REASON_DISK_FULL || reason == v1::ERROR_REASON_STORE_FAILED;
+         reason == v1::ERROR_REASON_DISK_FULL || reason == v1::ERROR_REASON_STORE_FAILED ||
+         reason == v1::ERROR_REASON_SESSION_ELSEWHERE;
 }
 
 absl::Status Make(absl::StatusCode code, v1::ErrorReason reason, std::string_view message, std::string_view field,
@@ -104,7 +107,7 @@ absl::Status Make(absl::StatusCode code, v1::ErrorReason reason, std::string_vie
   return status;
 }
 
-// With what the core's errors about sizes at points begin.
+// The beginning of the core's errors about sizes at points.
 constexpr char kSizes[] = "size_samples.";
 
 // An error of the core, with the reason that it has for clients; CANCELLED and DEADLINE_EXCEEDED have none.
@@ -120,6 +123,17 @@ absl::Status FromCore(const absl::Status& status) {
           return MakeError(v1::ERROR_REASON_INVALID_SEGMENTS, message, field);
         }
       }
+      for (const auto& [what, field] : {std::pair("triangles", "triangles.corners"),
+                                        {"surface:", "triangles.corners"},
+                                        {"solids:", "surface.solids"},
+                                        {"crease_angle:", "surface.crease_angle"},
+                                        {"weld:", "surface.weld"},
+                                        {"min_patch:", "surface.min_patch"},
+                                        {"resolution:", "surface.resolution"}}) {
+        if (message.rfind(what, 0) == 0) {
+          return MakeError(v1::ERROR_REASON_INVALID_TRIANGLES, message, field);
+        }
+      }
       if (message.rfind(kSizes, 0) == 0) {
         return MakeError(v1::ERROR_REASON_INVALID_SIZES, message, "size_samples.points");
       }
@@ -133,6 +147,8 @@ absl::Status FromCore(const absl::Status& status) {
       return MakeError(v1::ERROR_REASON_MESH_TOO_LARGE, message);
     case absl::StatusCode::kFailedPrecondition:
       return MakeError(v1::ERROR_REASON_MESH_NOT_READY, message);
+    case absl::StatusCode::kUnimplemented:  // of what this input does not have
+      return MakeError(v1::ERROR_REASON_INVALID_REQUEST, message);
     case absl::StatusCode::kCancelled:
     case absl::StatusCode::kDeadlineExceeded:
       return status;
@@ -174,6 +190,13 @@ absl::Status MakeError(v1::ErrorReason reason, std::string_view message, std::st
 absl::Status MakeError(absl::StatusCode code, v1::ErrorReason reason, std::string_view message,
                        std::string_view field) {
   return Make(code, reason, message, field, PassesWithTime(reason));
+}
+
+absl::Status OfSurface(const absl::Status& status) {
+  const std::string message(status.message());
+  return status.code() == absl::StatusCode::kInvalidArgument && message.rfind("seeds[", 0) == 0
+             ? MakeError(v1::ERROR_REASON_INVALID_TRIANGLES, message, "surface.seeds")
+             : status;
 }
 
 absl::Status MemoryLimitError(std::string_view message, bool may_retry) {

@@ -1,4 +1,4 @@
-// Errors: what a status says besides its code, and the one place where it becomes the status of a call.
+// Errors: the details that a status has besides its code, and the one place where it becomes the status of a call.
 #ifndef WELLSPACE_SERVER_WIRE_ERRORS_H_
 #define WELLSPACE_SERVER_WIRE_ERRORS_H_
 
@@ -24,6 +24,8 @@ inline constexpr char kErrorDomain[] = "wellspace.v1";
 absl::Status MakeError(v1::ErrorReason reason, std::string_view message, std::string_view field = "");
 // The same for a reason that comes with more than one code.
 absl::Status MakeError(absl::StatusCode code, v1::ErrorReason reason, std::string_view message, std::string_view field);
+// An error of the core about an input with a surface: seeds are those of solids, which its message does not say.
+absl::Status OfSurface(const absl::Status& status);
 // A MEMORY_LIMIT, which passes with time or does not.
 absl::Status MemoryLimitError(std::string_view message, bool may_retry);
 bool IsMemoryLimit(const absl::Status& status);
@@ -32,7 +34,7 @@ bool IsMemoryLimit(const absl::Status& status);
 // the call may be repeated. To be called where a status leaves the server, nowhere else.
 //
 // A status without a reason is the core's. The parameters were validated before, so that its INVALID_ARGUMENT is about
-// points, segments, faces or sizes at points. CANCELLED and DEADLINE_EXCEEDED have no reason.
+// points, segments, faces, triangles or sizes at points. CANCELLED and DEADLINE_EXCEEDED have no reason.
 grpc::Status ToGrpcStatus(const absl::Status& status);
 
 // `status` as a message, as it would reach a client.

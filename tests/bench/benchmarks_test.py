@@ -1,4 +1,4 @@
-"""The benchmarks run on tiny clouds, and compare notices a mesh that is not what it should be."""
+"""The benchmarks run on tiny clouds, and compare notices a mesh that is not as it should be."""
 
 import copy
 import csv

@@ -2,10 +2,12 @@
 #include "client/client.h"
 
 #include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "client/connection.h"
+#include "client/overview.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
@@ -42,6 +44,9 @@ class MockConnection : public Connection {
   MOCK_METHOD(absl::StatusOr<AddedSegments>, AddSegments,
               (const std::string&, const Features&, const std::optional<FeatureOffset>&, const CallOptions&),
               (override));
+  MOCK_METHOD(absl::StatusOr<AddedTriangles>, AddTriangles,
+              (const std::string&, const SurfaceFeatures&, const std::optional<SurfaceOffset>&, const CallOptions&),
+              (override));
   MOCK_METHOD(absl::StatusOr<SizesSet>, SetSizes, (const std::string&, const SizeSamples&, const CallOptions&),
               (override));
   MOCK_METHOD(absl::StatusOr<SizesSet>, SetVertexSizes, (const std::string&, const VertexSizes&, const CallOptions&),
@@ -67,7 +72,9 @@ class MockConnection : public Connection {
   MOCK_METHOD(absl::StatusOr<Located>, Locate,
               (const std::string&, std::span<const double>, const LocateOptions&, const CallOptions&), (override));
   MOCK_METHOD(absl::StatusOr<AddedVertices>, AddVertices,
-              (const std::string&, std::span<const double>, std::span<const uint32_t>, const CallOptions&), (override));
+              (const std::string&, std::span<const double>, std::span<const uint32_t>, const OnAdded&,
+               const CallOptions&),
+              (override));
 };
 
 absl::Status E(const char* what) { return absl::AbortedError(what); }
@@ -78,7 +85,7 @@ TEST(Client, PassesMeshingToItsConnection) {
   const std::vector<double> points = {1, 2};
   MeshOptions options;
   options.dimension = 2;
-  // What a call is made with reaches each of them.
+  // The options of a call reach each call of the connection.
   const CallOptions call = {.timeout = absl::Seconds(3), .stop = {}, .request_id = "", .expected_revision = {}};
   const auto is_call = Field(&CallOptions::timeout, absl::Seconds(3));
   EXPECT_CALL(*connection, MeshPoints(Field(&MeshOptions::dimension, 2), SizeIs(2), _, _, is_call))
@@ -107,6 +114,7 @@ TEST(Client, PassesSessionsAndOperationsToItsConnection) {
                        Field(&CallOptions::expected_revision, std::optional<uint64_t>(4)));
   const std::vector<double> points = {1, 2};
   SpanSource source(2, points);
+  const SurfaceFeatures surface;
   const Features features;
   const SizeSamples samples;
   const VertexSizes vertex_sizes;
@@ -122,6 +130,8 @@ TEST(Client, PassesSessionsAndOperationsToItsConnection) {
       .WillOnce(Return(E("upload")));
   EXPECT_CALL(*connection, AddSegments("s", ::testing::Ref(features), Optional(FeatureOffset{7, 8}), is_call))
       .WillOnce(Return(E("segments")));
+  EXPECT_CALL(*connection, AddTriangles("s", ::testing::Ref(surface), Optional(SurfaceOffset{9, 1}), is_call))
+      .WillOnce(Return(E("triangles")));
   EXPECT_CALL(*connection, SetSizes("s", ::testing::Ref(samples), is_call)).WillOnce(Return(E("sizes")));
   EXPECT_CALL(*connection, SetVertexSizes("s", ::testing::Ref(vertex_sizes), is_call))
       .WillOnce(Return(E("vertex sizes")));
@@ -144,6 +154,7 @@ TEST(Client, PassesSessionsAndOperationsToItsConnection) {
   EXPECT_EQ(client.RemovePoints("s", std::vector<uint64_t>{1, 2}, call).status(), E("remove"));
   EXPECT_EQ(client.UploadPoints("s", source, 5, nullptr, call).status(), E("upload"));
   EXPECT_EQ(client.AddSegments("s", features, FeatureOffset{7, 8}, call).status(), E("segments"));
+  EXPECT_EQ(client.AddTriangles("s", surface, SurfaceOffset{9, 1}, call).status(), E("triangles"));
   EXPECT_EQ(client.SetSizes("s", samples, call).status(), E("sizes"));
   EXPECT_EQ(client.SetVertexSizes("s", vertex_sizes, call).status(), E("vertex sizes"));
   EXPECT_EQ(client.DownloadMesh("s", sink, 6, nullptr, call), E("download"));
@@ -165,12 +176,74 @@ TEST(Client, PassesQueriesToItsConnection) {
   EXPECT_CALL(*connection, VoronoiCells("s", SizeIs(3), _, _)).WillOnce(Return(E("cells")));
   EXPECT_CALL(*connection, Locate("s", SizeIs(2), Field(&LocateOptions::revision, std::optional<uint64_t>(5)), _))
       .WillOnce(Return(E("locate")));
-  EXPECT_CALL(*connection, AddVertices("s", SizeIs(2), SizeIs(3), _)).WillOnce(Return(E("add")));
+  EXPECT_CALL(*connection, AddVertices("s", SizeIs(2), SizeIs(3), _, _)).WillOnce(Return(E("add")));
   EXPECT_EQ(client.ApproximateNearestNeighbors("s", vertices, nullptr), E("nearest"));
   EXPECT_EQ(client.ClippedVoronoiCells("s", vertices, 4, nullptr), E("clipped"));
   EXPECT_EQ(client.VoronoiCells("s", vertices, nullptr), E("cells"));
   EXPECT_EQ(client.Locate("s", points, {.revision = 5}).status(), E("locate"));
   EXPECT_EQ(client.AddVertices("s", points, vertices).status(), E("add"));
+}
+
+Session SessionNamed(const std::string& name, SessionState state, const std::string& operation) {
+  Session session;
+  session.name = name;
+  session.state = state;
+  session.last_operation = operation;
+  return session;
+}
+
+absl::StatusOr<Operation> OperationInState(OperationState state) {
+  Operation operation;
+  operation.state = state;
+  return operation;
+}
+
+// Two pages of sessions: one that never had an operation, one that is done, one that works, one that goes meanwhile.
+std::shared_ptr<MockConnection> FourSessions() {
+  auto connection = std::make_shared<testing::NiceMock<MockConnection>>();
+  SessionPage first;
+  first.sessions = {SessionNamed("new", SessionState::kOpen, ""), SessionNamed("done", SessionState::kReady, "done/1")};
+  first.next_page_token = "next";
+  SessionPage second;
+  second.sessions = {SessionNamed("works", SessionState::kRefining, "works/1"),
+                     SessionNamed("goes", SessionState::kRefining, "goes/1")};
+  ON_CALL(*connection, ListSessions(_, Field(&PageOptions::page_token, ""), _)).WillByDefault(Return(first));
+  ON_CALL(*connection, ListSessions(_, Field(&PageOptions::page_token, "next"), _)).WillByDefault(Return(second));
+  ON_CALL(*connection, GetOperation("done/1", _)).WillByDefault(Return(OperationInState(OperationState::kSucceeded)));
+  ON_CALL(*connection, GetOperation("works/1", _)).WillByDefault(Return(OperationInState(OperationState::kRunning)));
+  ON_CALL(*connection, GetOperation("goes/1", _)).WillByDefault(Return(absl::NotFoundError("gone")));
+  return connection;
+}
+
+std::vector<std::string> NamesOf(const absl::StatusOr<Overview>& overview) {
+  std::vector<std::string> names;
+  for (const SessionWithOperation& one : overview->sessions) {
+    names.push_back(one.session.name);
+  }
+  return names;
+}
+
+TEST(GetOverview, HasAllSessionsWithTheirOperations) {
+  Client client(FourSessions());
+  const absl::StatusOr<Overview> all = GetOverview(client);
+  ASSERT_TRUE(all.ok()) << all.status();
+  EXPECT_EQ(NamesOf(all), (std::vector<std::string>{"new", "done", "works"}));
+  EXPECT_FALSE(all->sessions[0].operation.has_value());
+  EXPECT_EQ(all->sessions[2].operation->state, OperationState::kRunning);
+  EXPECT_FALSE(all->has_more);
+  EXPECT_EQ(NamesOf(GetOverview(client, {.busy_alone = true})), std::vector<std::string>{"works"});
+  const absl::StatusOr<Overview> some = GetOverview(client, {.most = 2});
+  EXPECT_EQ(some->sessions.size(), 2u);
+  EXPECT_TRUE(some->has_more);
+}
+
+TEST(GetOverview, ErrorsOfCallsAreItsOwn) {
+  const auto connection = FourSessions();
+  ON_CALL(*connection, GetOperation("done/1", _)).WillByDefault(Return(E("operation")));
+  Client client(connection);
+  EXPECT_EQ(GetOverview(client).status(), E("operation"));
+  ON_CALL(*connection, ListSessions(_, _, _)).WillByDefault(Return(E("list")));
+  EXPECT_EQ(GetOverview(client).status(), E("list"));
 }
 
 TEST(SpanSource, SeeksAndReadsWholeRows) {

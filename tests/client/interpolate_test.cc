@@ -1,3 +1,4 @@
+// Values between vertices against a linear function; values of another mesh are refused.
 #include "client/interpolate.h"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// Which errors are repeated, how often, and after which delay.
 #include "client/retry_policy.h"
 
 #include <string>

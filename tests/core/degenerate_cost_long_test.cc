@@ -11,7 +11,7 @@
 #include <limits>
 #include <vector>
 
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "tests/support/clouds.h"
 #include "tests/support/parameters.h"
 

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "tests/support/canonical.h"
 #include "tests/support/clouds.h"
 

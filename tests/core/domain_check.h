@@ -13,7 +13,7 @@
 
 #include "absl/status/status.h"
 #include "core/base/run_context.h"
-#include "core/mesh.h"
+#include "core/mesh/mesh.h"
 #include "core/validate/validate_domain.h"
 #include "tests/core/domain_input.h"
 

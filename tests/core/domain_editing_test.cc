@@ -16,7 +16,7 @@
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
 #include "core/geometry/exact_measure.h"
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "core/validate/validate_domain.h"
 #include "tests/core/domain_check.h"
 #include "tests/core/domain_input.h"
@@ -379,7 +379,7 @@ TEST_F(DomainEditingTest, TimesAddUp) {
   }
 }
 
-// Random segments on a grid, where many meet in acute angles, and points of all kinds in and on what they bound.
+// Random segments on a grid, where many meet in acute angles, and points of all kinds in and on their faces.
 TEST_F(DomainEditingTest, RandomPointsInRandomDomains) {
   for (int run = 0; run < 40; ++run) {
     Input input = test::SegmentsOnASmallGrid(random_);
@@ -411,7 +411,7 @@ TEST_F(DomainEditingTest, RandomPointsInRandomDomains) {
   }
 }
 
-// Which points are meshed is held against the triangles that there are.
+// The points that are meshed are compared with the triangles that there are.
 TEST_F(DomainEditingTest, RandomPointsAreMeshedWhereTrianglesAre) {
   Input input = Input().Circle({0, 0}, 1, 60).Circle({0.3, 0}, 0.3, 23);
   input.seeds = {{.at = {0.3, 0}, .is_hole = true}};

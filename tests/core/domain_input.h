@@ -15,7 +15,7 @@
 #include "core/base/run_context.h"
 #include "core/features/features.h"
 #include "core/geometry/point.h"
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "tests/support/clouds.h"
 
 namespace wellspace::test {

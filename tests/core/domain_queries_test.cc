@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "core/geometry/exact_measure.h"
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "tests/core/domain_input.h"
 #include "tests/support/seeded_test.h"
 
@@ -137,7 +137,7 @@ class DomainQueriesTest : public test::SeededTest {
         const Polygon expected = CellAmongAll(mesh, v, cell.clip_radius);
         const Polygon nodes = NodesOf(cell);
         EXPECT_NEAR(AreaOf(nodes), AreaOf(expected), 1e-12) << v;
-        // Clipped by the cube is what has a node on it, and not on the box.
+        // A cell is clipped by the cube if it has a node on it, and not on the box.
         const bool is_clipped = std::any_of(nodes.begin(), nodes.end(), [&](const Point<2>& x) {
           const Point<2> from = Difference<2>(x, At(mesh, v));
           return std::max(std::abs(from[0]), std::abs(from[1])) > cell.clip_radius * (1 - 1e-9);

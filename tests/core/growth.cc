@@ -7,14 +7,14 @@
 #include <numbers>
 #include <vector>
 
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "tests/core/domain_input.h"
 #include "tests/support/clouds.h"
 
 namespace wellspace::test {
 namespace {
 
-// Measured from 10^3 to 10^6: at most 1.15 (visits of uniform points in 3-D). What grew like log n would double.
+// Measured from 10^3 to 10^6: at most 1.15 (visits of uniform points in 3-D). Work that grew like log n would double.
 constexpr double kMostGrowth = 1.25;
 
 // Averages over the queries of one run. Visits and cuts are divided by simplices per vertex, a measure of the cells
@@ -42,7 +42,7 @@ Work WorkOf(const core::MeshStatistics& s) {
           .star_share = Ratio(s.star_leaves_visited + s.star_vertices_visited, s.leaves_visited + s.vertices_visited)};
 }
 
-// What the work is for meshes of these sizes, of which that of the queries is expected to be constant.
+// The work for meshes of these sizes, of which that of the queries is expected to be constant.
 std::vector<Work> ExpectConstantQueries(std::span<const size_t> sizes,
                                         const std::function<absl::StatusOr<core::Mesh>(size_t size)>& make_mesh) {
   std::vector<Work> work;

@@ -1,3 +1,4 @@
+// The work for a vertex does not grow with the input: counters at sizes of every run.
 #include "tests/core/growth.h"
 
 #include <gtest/gtest.h>

@@ -61,7 +61,7 @@ double LeastRho() {
   return std::pow(2.0, 0.5 * (D - 1));
 }
 
-// What a run did, and how it ended.
+// The figures of a run, and its end.
 struct Outcome {
   absl::Status status;
   uint64_t before = 0;  // points and corners

@@ -37,7 +37,7 @@ constexpr double kGamma = 1 / std::numbers::sqrt2;
 constexpr double kGammaOuter = 0.25 / std::numbers::sqrt2;
 constexpr double kGammaFace = 0.5 / std::numbers::sqrt2;
 
-// What the rounding of coordinates does to a distance.
+// The error of a distance by the rounding of coordinates.
 template <int D>
 double Rounding(const Box<D>& box) {
   double largest = 0;
@@ -280,7 +280,7 @@ void GuaranteeChecker<D>::CheckSize(const QueryStructure<D>& structure, const In
   origins_.push_back(origin);
 }
 
-// Definition 1 (2): what waited just before the insertion.
+// Definition 1 (2): the edges that waited just before the insertion.
 template <int D>
 void GuaranteeChecker<D>::CheckOrder(const Insertion& insertion) {
   const double edge = std::min(std::sqrt(insertion.edge_sq), std::sqrt(insertion.edge_limit_sq));

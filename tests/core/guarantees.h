@@ -26,7 +26,7 @@ struct SizeConstants {
   static SizeConstants Of(const core::MeshCriteria<D>& criteria);
 };
 
-// What Definition 1 (2) is about: the shortest edge that a vertex asks for something by.
+// The edges of Definition 1 (2): the shortest edge that a vertex asks for something by.
 struct PendingEdges {
   struct Edge {
     double length = std::numeric_limits<double>::infinity();
@@ -45,7 +45,7 @@ PendingEdges ShortestPending(const core::QueryStructure<D>& structure, const cor
 template <int D>
 class GuaranteeChecker {
  public:
-  // What has been seen: so that nothing is passed because there was nothing to check.
+  // The extent of the checks: so that nothing is passed because there was nothing to check.
   struct Seen {
     int insertions = 0;
     int on_faces = 0;    // of these, points of faces

@@ -1,4 +1,4 @@
-// What docs/design/guarantees.md promises of every refinement, on random and adversarial clouds.
+// The guarantees of docs/design/guarantees.md for every refinement, on random and adversarial clouds.
 #include "tests/core/guarantees.h"
 
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "tests/core/guarantee_runs.h"
 #include "tests/support/seeded_test.h"
 
@@ -66,7 +66,7 @@ TYPED_TEST(GuaranteesTest, AtEveryInsertionInALongBox) {
   ExpectGuaranteesOfAll<D>(Criterion::kRadiusEdge, "long", 1.25 * LeastRho<D>(), D == 2 ? 16 : 8, this->seed_ + 3);
 }
 
-// Below the least rho nothing promises an end, but what is inserted obeys the same rules.
+// Below the least rho nothing promises an end, but insertions obey the same rules.
 TYPED_TEST(GuaranteesTest, AtEveryInsertionBelowTheLeastRho) {
   constexpr int D = TypeParam::kValue;
   int insertions = 0;
@@ -200,7 +200,7 @@ TYPED_TEST(GuaranteesTest, PendingEdgesAreSeen) {
   EXPECT_NE(checker.violation().find("was pending"), std::string::npos) << checker.violation();
 }
 
-// Termination: on every generator, in every box, within a multiple of what the tree over the points and the box needs.
+// Termination: on every generator, in every box, within a multiple of the needs of the tree over points and box.
 
 TYPED_TEST(GuaranteesTest, EndsForTheLeastRho) {
   constexpr int D = TypeParam::kValue;

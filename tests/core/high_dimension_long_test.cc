@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "core/validate/validate.h"
 #include "tests/support/clouds.h"
 #include "tests/support/parameters.h"

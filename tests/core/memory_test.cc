@@ -1,9 +1,9 @@
-// What a run asks of its memory lender.
+// The memory that a run asks its lender for.
 #include <atomic>
 #include <memory>
 #include <vector>
 
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "gtest/gtest.h"
 #include "tests/core/domain_input.h"
 #include "tests/support/clouds.h"
@@ -11,7 +11,7 @@
 namespace wellspace::core {
 namespace {
 
-// Lends up to a limit, in one phase or in all, and remembers what it was asked for.
+// Lends up to a limit, in one phase or in all, and remembers the bytes that it was asked for.
 class Lender final : public MemoryLender {
  public:
   explicit Lender(RunContext& context) : context_(context) { context.SetMemoryLender(this); }
@@ -134,7 +134,7 @@ TEST(Memory, OfADomainIsReservedForItsGraphThenForTheMeshAndTheRunHoldsNoMore) {
     const absl::StatusOr<Mesh> mesh = MeshPoints(input.parameters, {input.points, input.features()}, context);
     ASSERT_TRUE(mesh.ok()) << mesh.status();
     ASSERT_EQ(lender.reserved.size(), 2u);
-    // Coordinates, ends, and what a graph, its faces, a sweep over it and a tree need of each at least.
+    // Coordinates, ends, and the least memory of a graph, its faces, a sweep over it and a tree for each.
     EXPECT_GT(lender.reserved[0], input.points.size() / 2 * 100 + input.ends.size() / 2 * 100);
     EXPECT_LE(lender.peak, lender.reserved[1]);
     for (const Phase phase : {Phase::kTree, Phase::kRefinement}) {  // which ends with the triangles

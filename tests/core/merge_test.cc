@@ -1,4 +1,4 @@
-// Merging of near points: what stays, what becomes what, and what is said where nothing is merged.
+// Merging of near points: points that stay, points that become others, and the answer where nothing is merged.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "core/mesher.h"
-#include "core/near_points.h"
+#include "core/input/near_points.h"
+#include "core/meshers/mesher.h"
 #include "tests/support/seeded_test.h"
 
 namespace wellspace::core {
@@ -79,7 +79,7 @@ class MergeTest : public test::SeededTest {
 
 template <int D>
 void ExpectByDefinition(const std::vector<double>& points, double distance) {
-  const auto domain = Domain<D>::Of(*BoxAround<D>(points, 0.25, RunContext()));
+  const auto domain = Frame<D>::Of(*BoxAround<D>(points, 0.25, RunContext()));
   ASSERT_TRUE(domain.ok());
   const auto merged = MergeNear<D>(*domain, points, distance, RunContext());
   ASSERT_TRUE(merged.ok());
@@ -268,7 +268,7 @@ TEST_F(MergeTest, FarPointsAreBlamedAndNotTheOthers) {
   points.insert(points.end(), {-1e12, 0});
   EXPECT_THAT(std::string(MeshOf({.dimension = 2}, points).status().message()),
               AllOf(HasSubstr("points[50]"), HasSubstr("points[201]"), HasSubstr("are so far from the others")));
-  // With a domain, the domain is what is too large; and twins stay twins, whatever is far away.
+  // With a domain, it is the domain that is too large; and twins stay twins, whatever is far away.
   EXPECT_THAT(std::string(MeshOf({.dimension = 2, .domain_low = {-1e13, -1e13}, .domain_high = {1e13, 1e13}}, points)
                               .status()
                               .message()),

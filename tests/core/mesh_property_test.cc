@@ -12,7 +12,7 @@
 #include <tuple>
 #include <vector>
 
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "core/validate/validate.h"
 #include "tests/support/clouds.h"
 #include "tests/support/parameters.h"
@@ -237,7 +237,7 @@ TEST_P(MeshPropertyTest, KeepsItsPromisesFarFromTheUnitBox) {
     MeshParameters parameters = InUnitBox(D());
     std::vector<double> cloud = Cloud();
     if (frame.offset != 0) {
-      // Coarser than what far offsets round away, so that no two points come too close.
+      // Coarser than the rounding of far offsets, so that no two points come too close.
       cloud.resize(std::min(cloud.size(), size_t{60}) / static_cast<size_t>(D()) * static_cast<size_t>(D()));
       for (double& x : cloud) {
         x = std::round(x * 4096) / 4096;

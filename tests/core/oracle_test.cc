@@ -11,7 +11,7 @@
 #include <tuple>
 #include <vector>
 
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "core/validate/validate.h"
 #include "tests/support/cgal_oracle.h"
 #include "tests/support/clouds.h"

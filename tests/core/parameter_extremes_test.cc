@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/base/saturate.h"
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "gtest/gtest.h"
 
 namespace wellspace::core {

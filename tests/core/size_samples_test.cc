@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "core/validate/validate.h"
 #include "tests/support/canonical.h"
 #include "tests/support/clouds.h"
@@ -100,7 +100,7 @@ class SizeSamplesTest : public ::testing::TestWithParam<int> {
 
 INSTANTIATE_TEST_SUITE_P(Dimensions, SizeSamplesTest, ::testing::Values(2, 3, 4));
 
-// What would take too long above, or is not calibrated there.
+// For tests that would take too long in 4-D, or are not calibrated there.
 class SizeSamplesUpTo3Test : public SizeSamplesTest {};
 
 INSTANTIATE_TEST_SUITE_P(Dimensions, SizeSamplesUpTo3Test, ::testing::Values(2, 3));
@@ -158,7 +158,7 @@ TEST_P(SizeSamplesUpTo3Test, NeighbouringSizesObeyTheGradation) {
   const absl::StatusOr<Mesh> mesh = MeshOf(parameters_);
   ASSERT_TRUE(mesh.ok()) << mesh.status();
   ASSERT_EQ(Valid(*mesh, parameters_), absl::OkStatus());
-  // By vertex: the longest of its edges, as a bound on what a size is there.
+  // By vertex: the longest of its edges, as a bound on the size there.
   std::vector<double> longest(mesh->vertex_count(), 0);
   const auto distance_from = [&](uint32_t v, double place) {
     double sum = 0;
@@ -208,7 +208,7 @@ TEST_P(SizeSamplesTest, ARefinedMeshTakesOthers) {
   ASSERT_EQ((*mesher)->Refine(parameters_, context), absl::OkStatus());
   const uint64_t first = (*mesher)->vertex_count();
 
-  // What is refused changes nothing.
+  // Refused demands change nothing.
   MeshParameters refused = parameters_;
   refused.size_samples = OneSample(std::vector<double>(d_, kNan), Mean());
   EXPECT_THAT(std::string((*mesher)->Refine(refused, context).message()), HasSubstr("size_samples.points[0]: "));

@@ -1,4 +1,4 @@
-"""What users of other meshers and remote meshing services suffer from, point by point, against the real server.
+"""Complaints about other meshers and remote meshing services, point by point, against the real server.
 
 docs/acceptance.md has the list, and the tests that go deeper into each point.
 """
@@ -18,7 +18,7 @@ from remote import Fails, Mesh, Remote, cloud, content, pieces, place_of, smalle
 from wellspaced import BIN, PATIENCE, ROOT, Wellspaced, api
 
 SANITIZED = bool(os.environ["WELLSPACE_SANITIZE"])
-SOON = 10  # seconds, for what comes within milliseconds where nothing else runs
+SOON = 10  # seconds, for answers that come within milliseconds where nothing else runs
 
 
 class Acceptance(unittest.TestCase):
@@ -183,7 +183,7 @@ class Acceptance(unittest.TestCase):
         self.assertEqual(operation.error.code, grpc.StatusCode.RESOURCE_EXHAUSTED.value[0])
         self.assertIn("5000", operation.error.message)
         status = pathlib.Path(f"/proc/{server.process.pid}/status").read_text()
-        if not SANITIZED:  # sanitizers keep what is freed
+        if not SANITIZED:  # sanitizers keep freed memory
             self.assertLess(int(re.search(r"VmHWM:\s+(\d+) kB", status)[1]) * 1024, limit)
 
     def test_the_same_mesh_from_run_to_run_and_for_any_number_of_threads(self):
@@ -198,7 +198,7 @@ class Acceptance(unittest.TestCase):
     def test_no_slivers(self):
         points = numpy.loadtxt(ROOT / "examples" / "spot.csv", delimiter=",", skiprows=1)
         angles = {}
-        for demanded in (None, 0, 15):  # None: what a client gets that asks for nothing
+        for demanded in (None, 0, 15):  # None: the default, for a client that asks for nothing
             parameters = api().MeshParameters(dimension=3, min_dihedral=demanded)
             metadata, chunks = self.remote.mesh(parameters, points)
             mesh = Mesh(metadata, chunks)
@@ -283,7 +283,7 @@ class Acceptance(unittest.TestCase):
                 look_at(method.input_type)
                 look_at(method.output_type)
         self.assertGreater(len(seen), 50)
-        # What is none of these is refused, and not taken for something else.
+        # A message of no such type is refused, and not taken for something else.
         call = self.remote.channel.stream_stream("/wellspace.v1.MeshingService/MeshPoints")
         with Fails(self, grpc.StatusCode.INVALID_ARGUMENT, "MALFORMED_REQUEST"):
             list(call(iter([b'{"parameters": {"dimension": 3}}']), timeout=PATIENCE))
@@ -315,7 +315,7 @@ class Acceptance(unittest.TestCase):
                     with Fails(self, grpc.StatusCode.UNAUTHENTICATED, "UNAUTHENTICATED"):
                         call()  # without a deadline
                     self.assertLess(time.monotonic() - begin, SOON)
-        # Who has one has what is his own, and only that.
+        # A user with a token sees his own sessions, and only those.
         ann, bob = (metadata(f"a-token-of-{tenant}-with-32-characters") for tenant in ("ann", "bob"))
         request = api().CreateSessionRequest(parameters=unit_box(2))
         session = remote.sessions.CreateSession(request, metadata=ann).session

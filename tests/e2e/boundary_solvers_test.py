@@ -16,7 +16,7 @@ import numpy
 
 from wellspaced import BIN, ROOT
 
-# The clouds; what of them the maximum of u is, −Δu = 1 with u = 0 on the boundary of the box.
+# The clouds; and the maximum of u on each, −Δu = 1 with u = 0 on the boundary of the box.
 CLOUDS = {2: ("coast-110m.csv", 12365), 3: ("spot.csv", 0.252)}
 NAMES = ["xmin", "xmax", "ymin", "ymax", "zmin", "zmax"]
 

@@ -1,4 +1,4 @@
-"""For tests in Python: the calls of wellspace.v1, and meshes put together of what they bring."""
+"""For tests in Python: the calls of wellspace.v1, and meshes put together of their answers."""
 import grpc
 import numpy
 
@@ -28,14 +28,14 @@ def place_of(phase):
 
 
 def cloud(request, parameters, points, rows=50_000, **others):
-    """The requests of MeshPoints or EstimateMesh, which are of type `request`; `others` is what the first has, too."""
+    """The requests of MeshPoints or EstimateMesh, which are of type `request`; `others`: more fields of the first."""
     yield request(parameters=parameters, **others)
     for first in range(0, len(points), rows):
         yield request(points=api().PointChunk(coordinates=points[first:first + rows].ravel()))
 
 
 def array_of(chunk):
-    """Which array a chunk is of, and its values as they are on the wire."""
+    """The array that a chunk is of, and its values as they are on the wire."""
     for name, kind in (("points", "<f8"), ("weights", "<f8"), ("simplices", "<u4"), ("input_vertices", "<u4"),
                        ("vertex_origins", "<u4"), ("vertex_tags", "<i4"), ("facets", "<u4")):
         values = getattr(chunk, name)

@@ -210,7 +210,7 @@ class SessionLife(unittest.TestCase):
     def test_the_commands_of_the_readme(self):
         blocks = re.findall(r"^```\n(.*?)^```", (ROOT / "README.md").read_text(), re.DOTALL | re.MULTILINE)
         blocks = [block for block in blocks if block.startswith(("wellspace mesh ", "export WELLSPACE_SERVER="))]
-        self.assertEqual(len(blocks), 3)
+        self.assertEqual(len(blocks), 2)
         (self.folder / "examples").symlink_to(ROOT / "examples")
         environment = self.environment | {"PATH": f"{BIN}:{os.environ['PATH']}"}
         for block in blocks:
@@ -218,7 +218,7 @@ class SessionLife(unittest.TestCase):
             done = subprocess.run(["bash", "-c", script], cwd=self.folder, env=environment, capture_output=True, text=True,
                                   timeout=PATIENCE, check=False)
             self.assertEqual(done.returncode, 0, (block, done.stdout, done.stderr))
-        for file in ("land.msh", "spot.vtu", "spot-quality.png", "coast.vtu", "finer.vtu"):
+        for file in ("land.msh", "part.vtu", "spot.vtu", "spot-quality.png", "coast.vtu", "finer.vtu"):
             self.assertGreater((self.folder / file).stat().st_size, 1000, file)
         self.run_tool("check", self.folder / "finer.vtu", "--size", 5)
         self.assertEqual(self.run_json("session", "list", "--label", "project=coast"), [], "deleted by the last command")

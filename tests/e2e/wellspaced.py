@@ -20,9 +20,10 @@ PATIENCE = 960 if os.environ.get("WELLSPACE_SANITIZE") else 240
 class Wellspaced:
     """A wellspaced on a free port of the loopback. Its log goes to `log`, or nowhere."""
 
-    def __init__(self, *arguments, log=subprocess.DEVNULL):
+    def __init__(self, *arguments, log=subprocess.DEVNULL, environment=None):
         self.process = subprocess.Popen([BIN / "wellspaced", "--listen", "127.0.0.1:0", *map(str, arguments)],
-                                        stdout=subprocess.PIPE, stderr=log, text=True)
+                                        stdout=subprocess.PIPE, stderr=log, text=True,
+                                        env={**os.environ, **(environment or {})})
         self.address = self.read_address("listening on ")
 
     def read_address(self, prefix):
@@ -84,7 +85,7 @@ def crc_table():
 
 
 def details(error):
-    """What an RpcError carries in google.rpc.Status.details: {message name: message}."""
+    """The details of an RpcError, google.rpc.Status.details: {message name: message}."""
     trailers = dict(error.trailing_metadata())
     status = api().Status.FromString(trailers.get("grpc-status-details-bin", b""))
     found = {}

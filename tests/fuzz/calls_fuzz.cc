@@ -76,7 +76,7 @@ std::unique_ptr<google::protobuf::Message> MakeMessage(const google::protobuf::D
       google::protobuf::MessageFactory::generated_factory()->GetPrototype(type)->New());
 }
 
-// What a call answered.
+// The answer of a call.
 struct Answer {
   grpc::Status status;
   std::vector<std::string> messages;

@@ -1,4 +1,4 @@
-// What an operator writes: every reader of it, on any text.
+// Configuration that an operator writes: every reader of it, on any text.
 //
 // Input: a digit from 0 to 3, then
 //   0  a file of tokens;

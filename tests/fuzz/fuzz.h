@@ -1,4 +1,4 @@
-// What the fuzzing entries share: the function that they define, a check, and a way to take inputs apart.
+// Helpers of the fuzzing entries: the function that they define, a check, and a way to take inputs apart.
 #ifndef WELLSPACE_TESTS_FUZZ_FUZZ_H_
 #define WELLSPACE_TESTS_FUZZ_FUZZ_H_
 
@@ -15,7 +15,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size);
 
 namespace wellspace::fuzz {
 
-// Aborts, saying what should have been, unless `holds`.
+// Aborts, naming the law, unless `holds`.
 inline void Require(bool holds, std::string_view expected, std::string_view detail = {}) {
   if (!holds) {
     std::cerr << "violated: " << expected << ' ' << detail << std::endl;

@@ -13,7 +13,7 @@
 namespace wellspace::fuzz {
 namespace {
 
-// The box is the bounding box of the vertices, that is what ValidateMesh takes it for.
+// The box is the bounding box of the vertices, as ValidateMesh takes it.
 void RequireBox(const core::Mesh& mesh) {
   for (int axis = 0; axis < mesh.dimension; ++axis) {
     double low = std::numeric_limits<double>::infinity();

@@ -4,7 +4,7 @@
 
 #include <span>
 
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 
 namespace wellspace::fuzz {
 

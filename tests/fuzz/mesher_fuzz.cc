@@ -1,7 +1,7 @@
 // The mesher on small degenerate clouds: coordinates of a coarse grid, some a few tiny steps off, on the faces of the
 // box or near them.
 //
-// Input: five bytes of parameters and what the first of them asks for besides (see ReadTask), then a byte for each
+// Input: five bytes of parameters and more bytes that the first of them asks for (see ReadTask), then a byte for each
 // coordinate (see ReadCoordinate).
 #include <algorithm>
 #include <array>
@@ -11,7 +11,7 @@
 #include <span>
 #include <vector>
 
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "tests/fuzz/fuzz.h"
 #include "tests/fuzz/mesh_check.h"
 
@@ -26,7 +26,7 @@ constexpr std::array<uint64_t, 4> kMaxVertices = {2000, 1000, 150, 220};
 constexpr double kGridStep = 0.125;
 constexpr double kLastGridLine = 7 * kGridStep;
 
-// How coordinates become those of the cloud: (x + offset) * scale.
+// The map of coordinates to those of the cloud: (x + offset) * scale.
 struct Placement {
   double tiny_step = 0;
   double offset = 0;
@@ -35,7 +35,7 @@ struct Placement {
   double Of(double x) const { return (x + offset) * scale; }
 };
 
-// What is done with the points.
+// The work that is done with the points.
 struct Task {
   core::MeshParameters parameters;
   Placement placement;
@@ -44,7 +44,7 @@ struct Task {
   size_t added_points = 0;
   bool one_by_one = false;
   core::MeshParameters then;
-  uint8_t samples = 0;  // what SetSamples takes
+  uint8_t samples = 0;  // for SetSamples
 };
 
 constexpr std::array kRhoFactors = {0.0, 1.0, 1.25, 2.0, 100.0};

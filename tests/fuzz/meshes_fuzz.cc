@@ -12,7 +12,7 @@
 //   6  a .mesh file;
 //   7  a .vtk file;
 //   8  a .vtp file;
-//   9  a byte as of 2, of which the fourth bit says base64; what follows where an array begins in appended data;
+//   9  a byte as of 2, of which the fourth bit says base64; bytes that follow where an array begins in appended data;
 //   :  a .14 file;
 //   ;  a .2dm file.
 #include <algorithm>
@@ -58,6 +58,10 @@ void RequireMesh(const Mesh& mesh) {
   Require(mesh.facets.size() == mesh.View().Shape().facet_count() * mesh.dimension, "every facet is of a part");
   for (const uint32_t vertex : mesh.facets) {
     Require(vertex < mesh.View().vertex_count(), "a facet has vertices of the mesh");
+  }
+  Require(mesh.ridges.size() % 2 == 0 && (mesh.ridges.empty() || mesh.dimension == 3), "ridges are edges in 3-D");
+  for (const uint32_t vertex : mesh.ridges) {
+    Require(vertex < mesh.View().vertex_count(), "a ridge has vertices of the mesh");
   }
 }
 

@@ -1,9 +1,10 @@
 // Numbers of every exponent and size in MeshParameters, through the server's checks, into the estimate and the mesher:
-// of a cloud, or of a domain in the plane.
+// of a cloud, or of a domain in the plane or in space.
 //
 // Input: a byte for the dimension, the criterion, how many points there are, and, by its highest bit, whether a domain
-//        is meshed; of that a double, the largest area in a part of it; then fields, each a byte that says which and
-//        the eight bytes of its double, low one first, or of its integer.
+//        is meshed, by the next one in space; of that a double, the largest area, or volume, in a part of it; in space
+//        three more, the crease angle, the weld distance and the least patch; then fields, each a byte that says which
+//        and the eight bytes of its double, low one first, or of its integer.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -13,8 +14,9 @@
 
 #include "core/base/saturate.h"
 #include "core/features/features.h"
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "core/validate/validate.h"
+#include "server/inputs/space_features.h"
 #include "server/wire/convert.h"
 #include "tests/fuzz/fuzz.h"
 #include "tests/fuzz/mesh_check.h"
@@ -35,6 +37,27 @@ uint64_t ReadInteger(ByteReader& bytes) {
   return value;
 }
 double ReadDouble(ByteReader& bytes) { return std::bit_cast<double>(ReadInteger(bytes)); }
+
+void ReadSurfaceField(int field, ByteReader& bytes, v1::MeshParameters& parameters) {
+  switch (field) {
+    case 1:
+      return parameters.mutable_surface()->set_tolerance(ReadDouble(bytes));
+    case 2:
+      return parameters.mutable_surface()->set_min_facet_angle(ReadDouble(bytes));
+    case 3:
+      return parameters.mutable_surface()->set_edge_length(ReadDouble(bytes));
+    case 4:
+      return parameters.mutable_surface()->set_min_size(ReadDouble(bytes));
+    case 5:
+      return parameters.mutable_surface()->set_outside_rho(ReadDouble(bytes));
+    case 6:
+      return parameters.mutable_surface()->set_curvature_elements(ReadDouble(bytes));
+    case 7:
+      return parameters.mutable_surface()->set_thickness_layers(ReadDouble(bytes));
+    default:
+      return parameters.set_pump_weights(true);
+  }
+}
 
 // Byte: the lowest four bits which field, the next three the axis of a corner.
 void ReadField(ByteReader& bytes, v1::MeshParameters& parameters) {
@@ -90,7 +113,7 @@ void ReadField(ByteReader& bytes, v1::MeshParameters& parameters) {
     case 14:
       return parameters.set_gradation(ReadDouble(bytes));
     default:
-      return parameters.set_pump_weights(true);
+      return ReadSurfaceField(byte >> 4 & 7, bytes, parameters);
   }
 }
 
@@ -134,6 +157,59 @@ void RequireDomainOrRefusal(const core::MeshParameters& parameters, double max_a
   }
 }
 
+v1::SurfaceOptions ReadSurfaceOptions(ByteReader& bytes, double max_volume) {
+  v1::SurfaceOptions options;
+  options.set_crease_angle(ReadDouble(bytes));
+  options.set_weld(ReadDouble(bytes));
+  options.set_min_patch(ReadDouble(bytes));
+  if (bytes.Next() % 2 == 1) {
+    options.set_solids(v1::SOLID_RULE_WINDING);
+    options.set_resolution(ReadDouble(bytes));
+  }
+  v1::SolidSeed& seed = *options.add_seeds();
+  seed.set_x(0.3);
+  seed.set_y(0.4);
+  seed.set_z(0.5);
+  seed.set_region(1);
+  seed.set_max_volume(max_volume);
+  return options;
+}
+
+// A cube, with these options.
+void RequireSurfaceOrRefusal(const core::MeshParameters& parameters, const v1::SurfaceOptions& options) {
+  const std::vector<double> points = {0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0, 0, 0, 1, 1, 0, 1, 0, 1, 1, 1, 1, 1};
+  v1::TriangleChunk triangles;
+  for (const uint32_t corner :
+       {0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5, 0, 1, 5, 0, 5, 4, 2, 6, 7, 2, 7, 3, 0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6}) {
+    triangles.add_corners(corner);
+  }
+  if (!server::CheckSurface(options, 0).ok()) {
+    return;
+  }
+  server::SpaceFeatures features;
+  features.Append(triangles);
+  features.Append(options);
+  const core::Input input(points, features.View());
+  if (!server::ValidateFor(input, parameters).ok()) {
+    return;
+  }
+  core::RunContext context;
+  if (const auto estimate = core::EstimateMesh(parameters, input, context); estimate.ok()) {
+    RequireCounts(*estimate, 1);
+  }
+  const absl::StatusOr<core::Mesh> mesh = core::MeshPoints(parameters, input, context);
+  if (!mesh.ok()) {
+    Require(mesh.status().code() == absl::StatusCode::kInvalidArgument ||
+                mesh.status().code() == absl::StatusCode::kResourceExhausted,
+            "a refusal is an INVALID_ARGUMENT or a RESOURCE_EXHAUSTED:", mesh.status().ToString());
+    return;
+  }
+  const core::MeshView view = {.dimension = 3, .points = mesh->points, .simplices = mesh->simplices};
+  for (const absl::Status& valid : {core::ValidateIndices(view), core::ValidateOrientation(view)}) {
+    Require(valid.ok(), "a mesh is valid:", valid.ToString());
+  }
+}
+
 }  // namespace
 }  // namespace wellspace::fuzz
 
@@ -142,9 +218,11 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   fuzz::ByteReader bytes(data, size);
   const uint8_t shape = bytes.Next();
   const bool is_domain = shape >> 7 != 0;
-  const double max_area = is_domain ? fuzz::ReadDouble(bytes) : 0;
+  const bool is_in_space = is_domain && (shape >> 6 & 1) != 0;
+  const double largest = is_domain ? fuzz::ReadDouble(bytes) : 0;
+  const v1::SurfaceOptions surface = is_in_space ? fuzz::ReadSurfaceOptions(bytes, largest) : v1::SurfaceOptions();
   v1::MeshParameters message;
-  message.set_dimension(is_domain ? 2 : 2 + shape % 5);
+  message.set_dimension(is_in_space ? 3 : is_domain ? 2 : 2 + shape % 5);
   message.set_criterion((shape >> 3 & 1) != 0 ? v1::CRITERION_WELL_SPACED : v1::CRITERION_RADIUS_EDGE);
   for (size_t i = 0; i < fuzz::kMaxFields && !bytes.empty() && message.dimension() >= 2 && message.dimension() <= 6;
        ++i) {
@@ -158,8 +236,12 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   core::MeshParameters parameters = *std::move(accepted);
   parameters.max_vertices = std::min(
       parameters.max_vertices, (uint64_t{1} << parameters.dimension) + fuzz::kMaxVertices[parameters.dimension - 2]);
+  if (is_in_space) {
+    fuzz::RequireSurfaceOrRefusal(parameters, surface);
+    return 0;
+  }
   if (is_domain) {
-    fuzz::RequireDomainOrRefusal(parameters, max_area > 0 ? max_area : std::numeric_limits<double>::infinity());
+    fuzz::RequireDomainOrRefusal(parameters, largest > 0 ? largest : std::numeric_limits<double>::infinity());
     return 0;
   }
   // In the unit box, or none: of another domain they would be outside.

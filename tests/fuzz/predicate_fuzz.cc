@@ -138,7 +138,7 @@ Decided<D> Translated(Decided<D> p, double by) {
   return p;
 }
 
-// Law 2. What goes there and back unchanged was scaled exactly.
+// Law 2. A number that goes there and back unchanged was scaled exactly.
 template <int D>
 void RequireInvariance(const Decided<D>& p) {
   for (const TieRule rule : {TieRule::kKeep, TieRule::kPerturb}) {

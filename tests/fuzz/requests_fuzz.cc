@@ -1,4 +1,4 @@
-// What a client may send in one call, through the server's checks and into the mesher.
+// Requests that a client may send in one call, through the server's checks and into the mesher.
 //
 // Input: requests, each as its length in two bytes, low one first, and that many bytes of a serialized
 // MeshPointsRequest.

@@ -1,6 +1,6 @@
 // Every call of the client library, answered by a server that sends any bytes.
 //
-// Input: a letter that chooses the call ('a' MeshPoints, then as in kCalls); then what the server does, in blocks of a
+// Input: a letter that chooses the call ('a' MeshPoints, then as in kCalls); then the server's steps, in blocks of a
 // letter, a length in two bytes, low one first, and that many bytes: 'e' ends the call with the status whose code is
 // the first of the bytes, the others being a serialized google.rpc.Status; any other letter sends the bytes. A call
 // that is repeated goes on with the rest; at the end of the input calls end with OK. A checksum of 0 in a chunk of a
@@ -45,7 +45,7 @@ struct Step {
   grpc::ByteBuffer answer;  // if it does not
 };
 
-// What the server does, call after call.
+// The steps of the server, call after call.
 class Script {
  public:
   void Set(std::deque<Step> steps) {
@@ -68,7 +68,7 @@ class Script {
   std::deque<Step> steps_;  // guarded by mutex_
 };
 
-// Takes whatever comes, and does what the script says.
+// Takes all requests, and acts by the script.
 class ScriptedCall final : public grpc::ServerGenericBidiReactor {
  public:
   explicit ScriptedCall(Script& script) : script_(script) {
@@ -133,7 +133,7 @@ class ScriptedServer final : public grpc::CallbackGenericService {
   std::shared_ptr<client::Connection> connection_;
 };
 
-// Requires of a mesh what MeshSink promises, and writes it to disk besides.
+// Requires of a mesh the guarantees of MeshSink, and writes it to disk besides.
 class SinkCheck final : public client::MeshSink {
  public:
   explicit SinkCheck(const char* name) : file_(ScratchFolder::Get().Path(name)) {}
@@ -263,10 +263,10 @@ void RequireWhole(const client::Mesh& mesh) {
   const size_t vertices = mesh.points.size() / dimension;
   const auto is_vertex = [&](uint32_t vertex) { return vertex < vertices; };
   Require(mesh.points.size() == vertices * dimension && mesh.simplices.size() % (dimension + 1) == 0 &&
-              mesh.facets.size() % dimension == 0,
+              mesh.facets.size() % dimension == 0 && mesh.ridges.size() % 2 == 0,
           "rows are whole");
   Require(std::ranges::all_of(mesh.simplices, is_vertex) && std::ranges::all_of(mesh.facets, is_vertex) &&
-              std::ranges::all_of(mesh.moved_vertices, is_vertex),
+              std::ranges::all_of(mesh.ridges, is_vertex) && std::ranges::all_of(mesh.moved_vertices, is_vertex),
           "vertices are of the mesh");
 }
 
@@ -320,7 +320,9 @@ constexpr std::array kCalls = {
     }},
     Call{[](client::Connection& c) { return c.ClippedVoronoiCells(kSession, kVertices, 2, RequireCells, Patience()); }},
     Call{[](client::Connection& c) { return c.VoronoiCells(kSession, {}, RequireCells, Patience()); }},
-    Call{[](client::Connection& c) { return c.AddVertices(kSession, kPoints, kVertices, Patience()).status(); }},
+    Call{[](client::Connection& c) {
+      return c.AddVertices(kSession, kPoints, kVertices, nullptr, Patience()).status();
+    }},
     Call{[](client::Connection& c) {
       client::Features features;
       features.ends = {0, 1};
@@ -336,6 +338,12 @@ constexpr std::array kCalls = {
     }},
     Call{[](client::Connection& c) {
       return RequirePlaces(c.Locate(kSession, kPoints, {.allow_outside = true}, Patience()));
+    }},
+    Call{[](client::Connection& c) {
+      client::SurfaceFeatures surface;
+      surface.corners = {0, 1, 2};
+      surface.seeds = {{.x = 1, .y = 2, .z = 3, .is_hole = true, .region = 0, .max_volume = {}}};
+      return c.AddTriangles(kSession, surface, std::nullopt, Patience()).status();
     }},
 };
 
@@ -392,7 +400,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const size_t call = static_cast<uint8_t>(bytes.Next() - 'a') % fuzz::kCalls.size();
   server.script().Set(fuzz::ReadSteps(bytes, call));
   const absl::Status status = fuzz::kCalls[call](server.connection());
-  // What is made of an error's details.
+  // The functions that take an error's details apart.
   if (!status.ok()) {
     client::BlamedField(status);
     client::ReasonOf(status);

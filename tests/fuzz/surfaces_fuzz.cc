@@ -1,4 +1,4 @@
-// Every reader of surfaces, on any bytes, and the preparation of what was read; and small complexes on a grid, where
+// Every reader of surfaces, on any bytes, and the preparation of surfaces; and small complexes on a grid, where
 // nearly everything is degenerate.
 //
 // Input: a character that chooses among kFormats, '0' the first, '1' the second and so on, and then the file; with a
@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "client/formats/surface/read_surface.h"
-#include "core/surface_report.h"
+#include "core/input/surface_report.h"
 #include "tests/fuzz/fuzz.h"
 #include "tests/fuzz/scratch_folder.h"
 
@@ -55,7 +55,7 @@ void RequireSurface(const Surface& surface) {
   }
 }
 
-// What is found of a complex has to fit together.
+// The findings about a complex have to fit together.
 void RequireReport(const core::SurfaceReport& report, uint64_t given) {
   Require(report.triangles > 0 && report.triangles + report.flat_triangles + report.equal_triangles == given,
           "every triangle is there, or counted");

@@ -1,4 +1,4 @@
-"""What is installed for development: programs of others find it, build by it and run; headers stand alone.
+"""The installed files for development: programs of others find them, build and run; headers stand alone.
 
     consumers_test.py [--subproject]
 
@@ -19,9 +19,9 @@ HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 BIN = pathlib.Path(os.environ["WELLSPACE_BIN_DIR"])
 PATIENCE = 600
-# Of Debian's, which are found by CMake, but are no part of what the core needs.
-NOT_OF_THE_CORE = ["gRPC", "Protobuf", "OpenSSL", "SQLite3", "spdlog", "CLI11", "nlohmann_json", "prometheus-cpp", "ZLIB",
-                   "PkgConfig", "Hdf5Static", "GTest", "CGAL"]
+# Of Debian's, which are found by CMake, but are not needed by the core.
+NOT_OF_THE_CORE = ["gRPC", "Protobuf", "OpenSSL", "SQLite3", "spdlog", "CLI11", "nlohmann_json", "prometheus-cpp",
+                   "ZLIB", "PkgConfig", "Hdf5Static", "GTest", "CGAL"]
 
 
 def run(*command, exit_code=0, **environment):
@@ -46,14 +46,16 @@ class Consumers(unittest.TestCase):
         cls.addClassCleanup(folder.cleanup)
         installed = pathlib.Path(folder.name) / "first"
         run("cmake", "--install", BIN.parent, "--component", "development", "--prefix", installed)
-        # Nothing of what is installed knows where it was installed to.
+        # No installed file knows where it was installed to.
         cls.prefix = installed.rename(pathlib.Path(folder.name) / "moved")
         cls.library_dir = next(cls.prefix.glob("lib/**/libwellspace_core.a")).parent
 
     def configure(self, text, exit_code=0):
         folder = in_folder(self)
-        (folder / "CMakeLists.txt").write_text("cmake_minimum_required(VERSION 3.25)\nproject(any LANGUAGES CXX)\n" + text)
-        return run("cmake", "-G", "Ninja", "-S", folder, "-B", folder / "build", f"-DCMAKE_PREFIX_PATH={self.prefix}", exit_code=exit_code)
+        (folder / "CMakeLists.txt").write_text("cmake_minimum_required(VERSION 3.25)\nproject(any LANGUAGES CXX)\n"
+                                               + text)
+        return run("cmake", "-G", "Ninja", "-S", folder, "-B", folder / "build", f"-DCMAKE_PREFIX_PATH={self.prefix}",
+                   exit_code=exit_code)
 
     def build(self, source, program="consumer"):
         folder = in_folder(self)
@@ -93,14 +95,16 @@ class Consumers(unittest.TestCase):
     def test_every_header_compiles_alone(self):
         headers = sorted((self.prefix / "include").rglob("*.h"))
         names = {header.relative_to(self.prefix / "include").as_posix() for header in headers}
-        self.assertLessEqual({"wellspace/core/mesher.h", "wellspace/client/client.h", "wellspace/client/formats/read_cloud.h",
+        self.assertLessEqual({"wellspace/core/meshers/mesher.h", "wellspace/client/client.h",
+                              "wellspace/client/formats/read_cloud.h",
                               "wellspace/client/formats/domain/read_planar_domain.h"}, names)
         folder = in_folder(self)
 
         def compile_alone(name):
             source = folder / (name.replace("/", "_") + ".cc")
             source.write_text(f"#include <{name}>\n#include <{name}>\n")
-            run("g++", "-std=c++20", "-fsyntax-only", "-Wall", "-Wextra", "-Werror", "-I", self.prefix / "include", source)
+            run("g++", "-std=c++20", "-fsyntax-only", "-Wall", "-Wextra", "-Werror", "-I", self.prefix / "include",
+                source)
 
         with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
             list(pool.map(compile_alone, names))
@@ -140,12 +144,13 @@ class Consumers(unittest.TestCase):
 
     def test_all_without_components(self):
         targets = "core client formats formats_domain formats_surface client_files"
-        self.configure(f"find_package(wellspace REQUIRED)\nforeach(name {targets})\nif(NOT TARGET wellspace::${{name}})\n"
+        self.configure(f"find_package(wellspace REQUIRED)\nforeach(name {targets})\n"
+                       "if(NOT TARGET wellspace::${name})\n"
                        "message(FATAL_ERROR ${name})\nendif()\nendforeach()\n")
 
     def test_versions(self):
-        self.configure("find_package(wellspace 0.1 REQUIRED COMPONENTS core)\n")
-        for other in ("0.0", "0.2", "1.0", "0.1.99"):
+        self.configure("find_package(wellspace 0.2 REQUIRED COMPONENTS core)\n")
+        for other in ("0.1", "0.3", "1.0", "0.2.99"):
             output = self.configure(f"find_package(wellspace {other} REQUIRED COMPONENTS core)\n", exit_code=1)
             self.assertIn("compatible with requested version", re.sub(r"\s+", " ", output))
 
@@ -171,13 +176,16 @@ class Parts(unittest.TestCase):
     @unittest.skipUnless((BIN.parent / "build.ninja").exists(), "wants a build by Ninja")
     def test_core_is_made_of_abseil_onetbb_and_boost(self):
         """The headers that went into the objects of the core, by their packages."""
-        inputs = run("ninja", "-C", BIN.parent, "-t", "inputs", "core/libwellspace_core.a", "core/libwellspace_core_sliver.a",
+        inputs = run("ninja", "-C", BIN.parent, "-t", "inputs", "core/libwellspace_core.a",
+                     "core/libwellspace_core_sliver.a",
                      "core/libwellspace_core_refine.a", "core/libwellspace_core_geometry.a").split()
         objects = [name for name in inputs if name.endswith(".o")]
         self.assertGreater(len(objects), 40)
-        headers = set(re.findall(r"^    (/usr/\S+)$", run("ninja", "-C", BIN.parent, "-t", "deps", *objects), re.MULTILINE))
+        headers = set(re.findall(r"^    (/usr/\S+)$", run("ninja", "-C", BIN.parent, "-t", "deps", *objects),
+                                 re.MULTILINE))
         owners = run("dpkg-query", "--search", *sorted({str(pathlib.Path(header).resolve()) for header in headers}))
-        packages = {owner.split(":")[0] for line in owners.splitlines() for owner in line.rsplit(": ", 1)[0].split(", ")}
+        packages = {owner.split(":")[0] for line in owners.splitlines()
+                    for owner in line.rsplit(": ", 1)[0].split(", ")}
         compiler = {"libc6-dev", "libgcc-12-dev", "libstdc++-12-dev", "linux-libc-dev"}
         self.assertEqual(packages - compiler, {"libabsl-dev", "libtbb-dev", "libboost1.74-dev"})
 
@@ -205,12 +213,14 @@ add_executable(mine ${{CMAKE_BINARY_DIR}}/main.cc)
 """)
         build = folder / "build"
         run("cmake", "-G", "Ninja", "-S", folder, "-B", build, "-DCMAKE_EXPORT_COMPILE_COMMANDS=ON")
-        commands = {entry["file"]: entry["command"] for entry in json.loads((build / "compile_commands.json").read_text())}
+        commands = {entry["file"]: entry["command"]
+                    for entry in json.loads((build / "compile_commands.json").read_text())}
         for file, command in commands.items():
             self.assertNotIn("-Werror", command, file)
         self.assertNotIn("-std=", commands[str(build / "main.cc")])
         names = set(re.findall(r"^(\w+)(?:-ADVANCED)?:", (build / "CMakeCache.txt").read_text(), re.MULTILINE))
-        ours = {name for name in names if name.startswith(("CTEST", "BUILD_TESTING", "GTest", "gRPC", "CMAKE_INSTALL_LIBDIR"))}
+        ours = {name for name in names if name.startswith(
+            ("CTEST", "BUILD_TESTING", "GTest", "gRPC", "CMAKE_INSTALL_LIBDIR"))}
         self.assertEqual(ours, set())
         self.assertFalse((build / "wellspace" / "tests").exists())
         run("cmake", "--install", build, "--prefix", folder / "prefix")

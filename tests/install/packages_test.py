@@ -111,7 +111,7 @@ class Packages(unittest.TestCase):
         self.assertTrue((self.root / "etc/systemd/system/multi-user.target.wants/wellspaced.service").is_symlink())
         conffiles = self.run_there("dpkg-query", "--show", "--showformat=${Conffiles}", "wellspaced")
         self.assertEqual(conffiles.split()[0], "/etc/default/wellspaced")
-        # What the file has are options that the server takes.
+        # The file has options that the server takes.
         self.run_there("sh", "-c", ". /etc/default/wellspaced && wellspaced $WELLSPACED_OPTIONS --help")
 
     def test_2_programs_are_built_by_the_libraries(self):

@@ -10,16 +10,21 @@ SCRIPT = pathlib.Path(__file__).resolve().parents[2] / "scripts" / "check_docs"
 CODE = {
     "core/tree.h": "class LeafTree {\n  void Build();\n};\n",
     "core/other.h": "void Elsewhere();\n",
+    "proto/wellspace/v1/a.proto": "service Trees {\n  rpc Grow(A) returns (B);\n  rpc Fell(A) returns (B);\n}\n",
+    "docs/calls.md": "| call | why |\n| --- | --- |\n| `Grow`, `Fell` | `Fell` is told apart |\n",
+    "docs/glossary.md": "| word | means |\n| --- | --- |\n| tree, wood | a |\n| tree node | b |\n",
     "tests/core/tree_test.cc": "TEST(LeafTreeTest, SplitsLeaves) {}\n",
     "tests/core/other_test.cc": "TEST(OtherTest, IsElsewhere) {}\n",
 }
 
 
 class CheckDocsTest(unittest.TestCase):
-    def run_with(self, line):
+    def run_with(self, line, calls=CODE["docs/calls.md"], words=""):
         with tempfile.TemporaryDirectory() as folder:
             root = pathlib.Path(folder)
-            for name, text in {**CODE, "docs/page.md": "# A page\n" + line + "\n"}.items():
+            for name, text in {**CODE, "docs/calls.md": calls,
+                               "docs/glossary.md": CODE["docs/glossary.md"] + words,
+                               "docs/page.md": "# A page\n" + line + "\n"}.items():
                 (root / name).parent.mkdir(parents=True, exist_ok=True)
                 (root / name).write_text(text, encoding="utf-8")
             result = subprocess.run([SCRIPT, root], capture_output=True, text=True, check=False)
@@ -47,6 +52,16 @@ class CheckDocsTest(unittest.TestCase):
             with self.subTest(line):
                 code, lines = self.run_with(line)
                 self.assertEqual((code, lines), (1, [f"docs/page.md:2: {message}"]))
+
+    def test_every_call_has_a_row(self):
+        for calls, count in (("| `Grow` |\n| other | `Fell` |\n", 0), ("| `Grow`, `Fell` |\n| `Fell` |\n", 2)):
+            code, lines = self.run_with("", calls)
+            self.assertEqual((code, len(lines)), (1, 1), lines)
+            self.assertIn(f"docs/calls.md:1: {count} rows for the call Fell of proto/wellspace/v1/a.proto", lines[0])
+
+    def test_a_word_has_one_line(self):
+        code, lines = self.run_with("", words="| leaf | c |\n\n| word | means |\n| --- | --- |\n| wood | d |\n")
+        self.assertEqual((code, lines), (1, ["docs/glossary.md:9: wood has a line already, 3: a word means one thing"]))
 
 
 if __name__ == "__main__":

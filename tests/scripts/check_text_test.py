@@ -1,4 +1,4 @@
-"""scripts/check_text finds planted lines, functions and subjects, and nothing in what is as it should be."""
+"""scripts/check_text finds planted lines, functions and subjects, and nothing in a right tree."""
 
 import pathlib
 import subprocess

@@ -1,4 +1,4 @@
-"""deploy/install-deps.sh asks for what is missing, only for that, and leaves the network alone when nothing is."""
+"""deploy/install-deps.sh asks for missing packages, only for these, and leaves the network alone when nothing is."""
 
 import os
 import pathlib

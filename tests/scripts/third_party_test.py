@@ -1,4 +1,4 @@
-"""THIRD_PARTY.md names what the programs of this build are linked with, and nothing else; HDF5 only writes (ADR 28)."""
+"""THIRD_PARTY.md names the libraries linked into this build's programs, and nothing else; HDF5 only writes (ADR 28)."""
 
 import os
 import pathlib

@@ -1,5 +1,5 @@
-// How much is done after a cancel, at any moment of a large run: reading, tree, refinement, simplices, slivers,
-// sending. What counts is the time of the processor, which is that of the clock on a machine that does nothing else.
+// The work done after a cancel, at any moment of a large run: reading, tree, refinement, simplices, slivers,
+// sending. The time of the processor counts, which is that of the clock on a machine that does nothing else.
 #include <time.h>
 
 #include <algorithm>

@@ -19,7 +19,7 @@ namespace {
 constexpr uint64_t kMaxMemoryBytes = kMinMemoryBytes;
 constexpr uint64_t kMostReceived = kLeastReceivedBytes + (64 << 20);  // gRPC looks now and then
 // The thread that ends a call waits for its turn, and on a busy machine the other connections are read meanwhile; and
-// what a call held is given back while the next one is read. Far less than what they announce, or than kMostReceived of
+// memory of a call is given back while the next one is read. Far less than what they announce, or than kMostReceived of
 // each.
 constexpr uint64_t kMostReceivedOfMany = 2 * kLeastReceivedBytes;
 constexpr uint32_t kAnnounced = uint32_t{1} << 30;
@@ -37,7 +37,7 @@ class EndlessMessages : public ::testing::Test {
     daemon_->Stop();
   }
 
-  // No job runs: what the server takes is what gRPC holds.
+  // No job runs: all memory of the server is held by gRPC.
   void ExpectReceivedAtMost([[maybe_unused]] uint64_t bytes) const {
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
     EXPECT_LT(daemon_->process().PeakMemory(), kMaxMemoryBytes + bytes);

@@ -1,4 +1,4 @@
-// The real server without file descriptors: what it has goes on, what comes is refused, and later it is as if nothing
+// The real server without file descriptors: its calls go on, new ones are refused, and later it is as if nothing
 // had been.
 #include <dirent.h>
 #include <signal.h>
@@ -74,7 +74,7 @@ class FileDescriptors : public ::testing::Test {
 
   void ExpectNoBusyLoop() {
     const absl::Duration before = CpuTime();
-    absl::SleepFor(absl::Seconds(1));  // what is measured
+    absl::SleepFor(absl::Seconds(1));  // the measured time
     EXPECT_LT(CpuTime() - before, absl::Milliseconds(300));
   }
 
@@ -132,7 +132,7 @@ TEST_F(FileDescriptors, NoneAtAllMakeConnectionsWait) {
   EXPECT_EQ(MeshFromAnotherProcess(), 0);
 }
 
-// What the system gives for the asking.
+// The hard limit, which the system grants for the asking.
 TEST(DescriptorLimit, IsRaisedAtTheStart) {
   Daemon daemon({}, "", "ulimit -Sn 100; ulimit -Hn 300");
   rlimit limit = {};
@@ -234,7 +234,7 @@ TEST(DurableFileDescriptors, AFileThatMustNotGrowIsAFullDisk) {
   calls.Upload(requests, &status);
   EXPECT_EQ(DetailsOf(status).reason, "DISK_FULL") << status.error_message();
   EXPECT_LT(calls.Get(name).committed_points(), kPoints);
-  // What fits is taken when it is sent again.
+  // A request that fits is taken when it is sent again.
   EXPECT_GE(calls.Upload({requests[0]}).committed_points(), kPiece);
   daemon.Stop();
   EXPECT_THAT(folder.Read("log"), Not(HasSubstr("store_failed")));

@@ -1,4 +1,4 @@
-// HTTP by hand: what Prometheus does, and what it would not.
+// HTTP by hand: requests as of Prometheus, and malformed ones.
 #ifndef WELLSPACE_TESTS_SERVER_HTTP_GET_H_
 #define WELLSPACE_TESTS_SERVER_HTTP_GET_H_
 
@@ -9,7 +9,7 @@ namespace wellspace::server {
 // A connection to `address`, "127.0.0.1:PORT", that has sent `bytes`. The descriptor is the caller's.
 int SendHttp(const std::string& address, const std::string& bytes);
 
-// What comes on `socket` until the server closes it, or for a minute.
+// The bytes that come on `socket` until the server closes it, or for a minute.
 std::string ReadHttp(int socket);
 
 // The whole response to GET `path`.

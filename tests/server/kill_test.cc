@@ -1,4 +1,4 @@
-// The real server, killed again and again among clients that go on: what it has acknowledged is there.
+// The real server, killed again and again among clients that go on: all that it has acknowledged is there.
 #include <signal.h>
 
 #include <atomic>
@@ -67,7 +67,7 @@ class MortalServer {
   std::optional<Subprocess> process_;
 };
 
-// One client, which writes down what was acknowledged, and compares.
+// One client, which notes acknowledged data, and compares.
 class Recorder {
  public:
   Recorder(const std::string& address, int number, const std::atomic<bool>& is_over)
@@ -93,7 +93,7 @@ class Recorder {
 
   int lives() const { return lives_; }
 
-  // What is there in the end is what was acknowledged.
+  // Expects all acknowledged data to be there in the end.
   void CheckAll() {
     for (const Acknowledged& kept : kept_) {
       Expect(kept);

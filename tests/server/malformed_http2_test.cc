@@ -1,4 +1,4 @@
-// The real server among clients that speak HTTP/2 badly on purpose: it closes what cannot go on, and serves all
+// The real server among clients that speak HTTP/2 badly on purpose: it closes bad connections, and serves all
 // others.
 #include <algorithm>
 #include <string>
@@ -124,7 +124,7 @@ TEST_F(MalformedHttp2, HeadersThatCannotBeDecodedHarmNoOther) {
     RawConnection connection = Begin();
     connection.Send(HeadersWith(hpack));
     connection.Send(Frame{.type = Frame::kData, .flags = Frame::kEndStream, .stream = 1, .payload = GrpcMessage("")});
-    // What of this gRPC forgives is its affair. Most of it ends the connection.
+    // gRPC may forgive some of these. Most of them end the connection.
     ++closed;
     closed -= connection.IsAlive() ? 1 : 0;
   }

@@ -1,4 +1,4 @@
-// Messages that are none, or not what they say, to every method of the real server.
+// Messages that are none, or of another type, to every method of the real server.
 #include <memory>
 #include <string>
 #include <vector>
@@ -48,7 +48,7 @@ std::string BytesOfLength(int field, uint64_t length, const std::string& content
   return Tag(field, kBytes) + Varint(length) + content;
 }
 
-// What no message of any type is.
+// Bytes that are no message of any type.
 std::vector<std::string> NoMessages() {
   return {
       std::string(5, '\xff'),                      // a tag without end
@@ -105,7 +105,7 @@ class MalformedMessages : public ::testing::Test {
 
   ~MalformedMessages() override { EXPECT_EQ(MeshTriangle(daemon_->Client()), absl::OkStatus()); }
 
-  // How a call of `method` with one message of these bytes ends.
+  // The end of a call of `method` with one message of these bytes.
   static grpc::Status Call(const MethodDescriptor& method, const std::string& bytes) {
     grpc::ClientContext context;
     context.set_deadline(std::chrono::system_clock::now() + std::chrono::minutes(1));

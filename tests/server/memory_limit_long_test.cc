@@ -1,4 +1,4 @@
-// The limit of memory of the real program, for every kind of input: what it holds is no more, whatever is sent.
+// The limit of memory of the real program, for every kind of input: it never holds more, whatever is sent.
 #include <cmath>
 #include <iostream>
 #include <memory>
@@ -19,7 +19,7 @@ namespace wellspace::server {
 namespace {
 
 constexpr uint64_t kMaxMemoryBytes = uint64_t{192} << 20;
-// Code, threads, and what arrays leave free of their pages.
+// Code, threads, and unused parts of the pages of arrays.
 constexpr double kRoom = 1.1;
 
 // A server with the limit, whose work is done or refused; in a folder, or in memory.
@@ -45,7 +45,7 @@ class Limited {
   Daemon daemon_;
 };
 
-// What the limit may do to a call.
+// Expects a call to have one of the ends that the limit allows.
 void ExpectDoneOrRefused(const absl::Status& status) {
   EXPECT_TRUE(status.ok() || absl::IsResourceExhausted(status) || absl::IsDeadlineExceeded(status)) << status;
 }

@@ -1,4 +1,4 @@
-// A client that asks a server all the time, while others do what they must not.
+// A client that asks a server all the time, while others misbehave.
 #ifndef WELLSPACE_TESTS_SERVER_OBSERVER_H_
 #define WELLSPACE_TESTS_SERVER_OBSERVER_H_
 

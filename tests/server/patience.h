@@ -1,4 +1,4 @@
-// How long a test grants what must be quick.
+// The time that a test grants to steps that must be quick.
 #ifndef WELLSPACE_TESTS_SERVER_PATIENCE_H_
 #define WELLSPACE_TESTS_SERVER_PATIENCE_H_
 

@@ -74,12 +74,12 @@ class RawConnection {
   // of its limits for agreed upon. False when the server has closed the connection.
   bool Begin();
 
-  // Whether the server took nothing of what was last sent for as long as the peer has patience.
+  // Whether the server took nothing of the last bytes sent for as long as the peer has patience.
   bool is_stuck() const { return is_stuck_; }
   // A minute at first.
   void SetPatience(int seconds);
 
-  // Throws away what has come.
+  // Throws away all bytes that have come.
   void Discard();
 
   // The next frame. None when the server has closed the connection, or sends nothing for a minute: the test has failed.

@@ -1,16 +1,16 @@
-// core::Mesher as a test wants it: what it does in each phase, or which mesh it makes.
+// A core::Mesher as a test wants it: with a script for each phase, or with a given mesh.
 #ifndef WELLSPACE_TESTS_SERVER_SCRIPTED_MESHER_H_
 #define WELLSPACE_TESTS_SERVER_SCRIPTED_MESHER_H_
 
 #include <cstdint>
 #include <functional>
 
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "server/calls/call_environment.h"
 
 namespace wellspace::server {
 
-// What a phase of a ScriptedMesher does; its status ends the run.
+// The action of a ScriptedMesher in a phase; its status ends the run.
 using PhaseScript = std::function<absl::Status(core::Phase, core::RunContext&)>;
 
 // Meshers that enter the phases of the core, run `script` in each, and have a mesh of MakeFakeMesh.

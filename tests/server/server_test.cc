@@ -1,4 +1,4 @@
-// What a server offers besides MeshPoints, and where it listens.
+// The services of a server besides MeshPoints, and its addresses.
 #include "server/server.h"
 
 #include <algorithm>

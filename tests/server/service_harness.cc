@@ -261,7 +261,7 @@ ServiceHarness::ServiceHarness(Mesher mesher, const ServiceOptions& options, Tra
     throw std::runtime_error(server.status().ToString());
   }
   server_ = *std::move(server);
-  // The client is in this process, too, and what it takes is no matter of the server's: gRPC's windows stay as they
+  // The client is in this process, too, and its memory is no matter of the server's: gRPC's windows stay as they
   // are, and do not grow with how long an answer takes on a busy machine.
   grpc::ChannelArguments arguments;
   arguments.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "grpcpp/grpcpp.h"
 #include "server/server.h"
 #include "wellspace/v1/meshing.grpc.pb.h"
@@ -52,7 +52,7 @@ struct ErrorDetails {
   bool may_retry = false;
 };
 ErrorDetails DetailsOf(const grpc::Status& status);
-// Of what clients would see of it.
+// Of the server as clients see it.
 ErrorDetails DetailsOf(const absl::Status& status);
 
 // The place of a phase in the order in which they come, which is not that of their numbers.
@@ -92,12 +92,12 @@ class TestCall {
   bool finished_ = false;
 };
 
-// What the chunks of `call` add up to.
+// The arrays that the chunks of `call` add up to.
 std::vector<double> PointsOf(const TestCall& call);
 std::vector<uint32_t> SimplicesOf(const TestCall& call);
 std::vector<uint32_t> InputVerticesOf(const TestCall& call);
 
-// What the server logged, line by line.
+// The log of the server, line by line.
 class LogLines {
  public:
   void Add(std::string line);
@@ -126,7 +126,7 @@ class ServiceHarness {
   std::shared_ptr<grpc::Channel> channel() { return channel_; }
 
   v1::GetServerInfoResponse Info();
-  // How long it takes from now until no job runs or waits.
+  // The time from now until no job runs or waits.
   absl::Duration TimeUntilIdle();
 
  private:

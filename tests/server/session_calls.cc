@@ -163,6 +163,15 @@ v1::AddSegmentsResponse SessionCalls::AddSegments(const std::vector<v1::AddSegme
   return response;
 }
 
+v1::AddTrianglesResponse SessionCalls::AddTriangles(const std::vector<v1::AddTrianglesRequest>& requests,
+                                                    grpc::Status* status) {
+  grpc::ClientContext context;
+  v1::AddTrianglesResponse response;
+  const auto stream = sessions_->AddTriangles(&context, &response);
+  SendAll(*stream, requests, status);
+  return response;
+}
+
 v1::SetSizesResponse SessionCalls::SetSizes(const std::vector<v1::SetSizesRequest>& requests, grpc::Status* status) {
   grpc::ClientContext context;
   v1::SetSizesResponse response;
@@ -298,6 +307,40 @@ v1::AddSegmentsRequest FrameRequest(const std::string& name) {
   region.set_x(0.5);
   region.set_y(2);
   region.set_region(3);
+  return request;
+}
+
+std::vector<double> BlockPoints() {
+  std::vector<double> points;
+  for (int corner = 0; corner < 8; ++corner) {
+    for (int axis = 0; axis < 3; ++axis) {
+      points.push_back((corner >> axis & 1) - 0.5);
+    }
+  }
+  return points;
+}
+
+v1::AddTrianglesRequest BlockRequest(const std::string& name) {
+  // The corners of each side, counterclockwise from outside; corner c has the bits of its coordinates.
+  constexpr uint32_t kSides[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
+                                     {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
+  v1::AddTrianglesRequest request;
+  request.set_name(name);
+  v1::TriangleChunk& triangles = *request.mutable_triangles();
+  int32_t marker = 0;
+  for (const auto& side : kSides) {
+    for (const uint32_t corner : {side[0], side[1], side[2], side[0], side[2], side[3]}) {
+      triangles.add_corners(corner);
+    }
+    ++marker;
+    triangles.add_markers(marker);
+    triangles.add_markers(marker);
+  }
+  v1::SurfaceOptions& surface = *request.mutable_surface();
+  surface.set_solids(v1::SOLID_RULE_HOLES);
+  v1::SolidSeed& region = *surface.add_seeds();
+  region.set_x(0.25);
+  region.set_region(4);
   return request;
 }
 

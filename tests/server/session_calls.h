@@ -43,7 +43,7 @@ class Watch {
   bool finished_ = false;
 };
 
-// What a download brought.
+// The messages of a download, and its end.
 struct Download {
   grpc::Status status;
   std::vector<v1::MeshMetadata> metadata;
@@ -75,6 +75,10 @@ class SessionCalls {
                                       grpc::Status* status = nullptr);
 
   // One stream of these requests.
+  v1::AddTrianglesResponse AddTriangles(const std::vector<v1::AddTrianglesRequest>& requests,
+                                        grpc::Status* status = nullptr);
+
+  // One stream of these requests.
   v1::SetSizesResponse SetSizes(const std::vector<v1::SetSizesRequest>& requests, grpc::Status* status = nullptr);
 
   v1::Operation Start(const v1::StartRefinementRequest& request, grpc::Status* status = nullptr);
@@ -89,7 +93,7 @@ class SessionCalls {
   // Downloads a mesh from `next_chunk` on. Breaks off when `stop_after` chunks have come.
   Download DownloadMesh(const std::string& name, uint64_t revision = 0, uint64_t next_chunk = 0,
                         std::optional<size_t> stop_after = std::nullopt, bool with_boundary = false);
-  // Downloads what `request` asks for, to its end.
+  // Makes the download of `request`, to its end.
   Download DownloadMesh(const v1::DownloadMeshRequest& request);
 
   // The chunks of the last mesh with its boundary, one behind the other.
@@ -141,6 +145,11 @@ v1::SetSizesRequest SizesRequest(const std::string& name, const std::vector<doub
 // with 10 segments, which have the markers 5, 9 and 0, and 2 seeds, of the hole and of region 3 on a side of the lines.
 std::vector<double> FramePoints();
 v1::AddSegmentsRequest FrameRequest(const std::string& name);
+
+// The cube [-0.5, 0.5]^3: points, and a request with 12 triangles, two for each side, which have the markers 1 to 6,
+// and a seed of region 4 inside.
+std::vector<double> BlockPoints();
+v1::AddTrianglesRequest BlockRequest(const std::string& name);
 
 // Points of the unit cube, away from its faces.
 std::vector<double> UniformPoints(size_t count, int dimension, uint64_t seed);

@@ -36,7 +36,7 @@ class SlowClients : public ::testing::Test {
     return connections_.back();
   }
 
-  // What a client that behaves is served.
+  // Expects a client that behaves to be served.
   void ExpectServing() { EXPECT_EQ(MeshTriangle(daemon_->Client()), absl::OkStatus()); }
 
   std::unique_ptr<Daemon> daemon_;
@@ -62,7 +62,7 @@ TEST_F(SlowClients, ThatGoByteByByteAreClosedAllTheSame) {
   const std::string start = ConnectionStart();
   RawConnection& slow = Send("");
   for (size_t i = 0; i + 1 < start.size() && slow.Send(start.substr(i, 1)); ++i) {
-    absl::SleepFor(absl::Milliseconds(100));  // what makes it slow
+    absl::SleepFor(absl::Milliseconds(100));  // this makes it slow
   }
   EXPECT_TRUE(slow.IsClosedByServer());
   ExpectServing();

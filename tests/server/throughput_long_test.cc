@@ -1,4 +1,4 @@
-// What the service costs on top of what it uses: of gRPC to carry bytes, of the core to make a mesh. Ratios of one run,
+// The overhead of the service: over gRPC alone, to carry bytes; over the core alone, to make a mesh. Ratios of one run,
 // never seconds.
 #include <algorithm>
 #include <cstdio>

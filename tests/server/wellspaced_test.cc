@@ -100,7 +100,7 @@ TEST(Wellspaced, HonoursItsLimits) {
   EXPECT_EQ(client.MeshPoints({}, points).status().code(), absl::StatusCode::kResourceExhausted);
 }
 
-// A file that is cut short by one of its bytes would start a server without what it says, tokens among it.
+// A file that is cut short by one of its bytes would start a server without its options, tokens among them.
 TEST(Wellspaced, RefusesAConfigurationThatIsNoText) {
   const TemporaryFolder folder;
   const std::string key = "max-points = 2\n";

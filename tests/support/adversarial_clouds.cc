@@ -192,7 +192,7 @@ Cloud<D> OfKind(std::string_view kind, size_t n, SplitMix64& random) {
       return generator(random, n);
     }
   }
-  // Those of clouds.h draw other points for another number of them.
+  // The clouds of clouds.h draw other points for another number of them.
   return ToPoints<D>(MakeCloud(kind, D, n + random.Below(4)));
 }
 

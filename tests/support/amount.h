@@ -1,4 +1,4 @@
-// How much of something a test does: a little as a rule, and more where the environment asks for it, as for long runs.
+// The amount of work of a test: a little as a rule, and more where the environment asks for it, as for long runs.
 #ifndef WELLSPACE_TESTS_SUPPORT_AMOUNT_H_
 #define WELLSPACE_TESTS_SUPPORT_AMOUNT_H_
 

@@ -1,4 +1,4 @@
-// Slow and independent ways to what the core computes fast, for the tests of predicates, cells and queries.
+// Slow and independent ways to the results that the core computes fast, for the tests of predicates, cells and queries.
 #ifndef WELLSPACE_TESTS_SUPPORT_BRUTE_FORCE_H_
 #define WELLSPACE_TESTS_SUPPORT_BRUTE_FORCE_H_
 
@@ -37,7 +37,7 @@ core::Point<D> ToPoint(const IntegerPoint<D>& p) {
   return out;
 }
 
-// What one plane of a cell is to all that look at it: the face of the box it begins with, or 2 D + the vertex's number.
+// The name of one plane of a cell: the face of the box it begins with, or 2 D + the vertex's number.
 using PlaneName = uint32_t;
 template <int D>
 using NodeName = std::array<PlaneName, D>;  // ascending

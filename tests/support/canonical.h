@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 
 namespace wellspace::test {
 

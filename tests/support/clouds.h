@@ -1,4 +1,4 @@
-// Point clouds for tests: those of bench/make_clouds.py, number by number, and degenerate ones.
+// Point clouds for tests: the clouds of bench/make_clouds.py, number by number, and degenerate ones.
 #ifndef WELLSPACE_TESTS_SUPPORT_CLOUDS_H_
 #define WELLSPACE_TESTS_SUPPORT_CLOUDS_H_
 

@@ -17,11 +17,11 @@ struct Dimension {
 // All that the core is built for.
 using AllDimensions = ::testing::Types<Dimension<2>, Dimension<3>, Dimension<4>, Dimension<5>, Dimension<6>>;
 
-// Those in which a cell is a Polygon or a Polyhedron, and the others.
+// The dimensions in which a cell is a Polygon or a Polyhedron, and the others.
 using UpTo3 = ::testing::Types<Dimension<2>, Dimension<3>>;
 using Above3 = ::testing::Types<Dimension<4>, Dimension<5>, Dimension<6>>;
 
-// Those in which whole meshes of a few points are small: in 5-D 260 vertices and more, in 6-D 700.
+// The dimensions in which whole meshes of a few points are small: in 5-D 260 vertices and more, in 6-D 700.
 using UpTo4 = ::testing::Types<Dimension<2>, Dimension<3>, Dimension<4>>;
 using UpTo5 = ::testing::Types<Dimension<2>, Dimension<3>, Dimension<4>, Dimension<5>>;
 

@@ -54,7 +54,7 @@ struct MeetingPoint {
         unit = std::min(unit, ExponentOf(x));
       }
     }
-    exponent = unit - 1;  // offsets are twice what they should be
+    exponent = unit - 1;  // offsets are twice as large as they should be
     std::array<std::array<cpp_int, D>, D> normals;
     std::array<cpp_int, D> offsets;
     for (int j = 0; j < D; ++j) {

@@ -1,4 +1,4 @@
-// Where planes meet, in integers: what the positions of nodes and their error bounds are held to.
+// The meeting points of planes, in integers, to which positions of nodes and their error bounds are held.
 #ifndef WELLSPACE_TESTS_SUPPORT_EXACT_NODES_H_
 #define WELLSPACE_TESTS_SUPPORT_EXACT_NODES_H_
 

@@ -1,4 +1,4 @@
-// Small meshes that are known to be right, for the tests of what checks and measures meshes.
+// Small meshes that are known to be right, for the tests of code that checks and measures meshes.
 #ifndef WELLSPACE_TESTS_SUPPORT_MESHES_H_
 #define WELLSPACE_TESTS_SUPPORT_MESHES_H_
 

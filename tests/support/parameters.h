@@ -2,7 +2,7 @@
 #ifndef WELLSPACE_TESTS_SUPPORT_PARAMETERS_H_
 #define WELLSPACE_TESTS_SUPPORT_PARAMETERS_H_
 
-#include "core/mesh_parameters.h"
+#include "core/input/mesh_parameters.h"
 #include "tests/support/clouds.h"
 
 namespace wellspace::test {

@@ -20,7 +20,7 @@ inline std::string PointText(const formats::PlanarDomain& domain, uint64_t point
   return text;
 }
 
-// Appends a whole number and what follows it.
+// Appends a whole number and the text that follows it.
 template <typename Number>
 void AppendWhole(Number value, const char* after, std::string& text) {
   text += std::to_string(value);

@@ -1,4 +1,4 @@
-// Meshes that are the same to the bit: those of the core, or of the client library.
+// Meshes that are the same to the bit: meshes of the core, or of the client library.
 #ifndef WELLSPACE_TESTS_SUPPORT_SAME_MESH_H_
 #define WELLSPACE_TESTS_SUPPORT_SAME_MESH_H_
 

@@ -2,9 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <fstream>
 #include <map>
 #include <numbers>
 #include <numeric>
+#include <sstream>
+#include <string>
 #include <utility>
 
 namespace wellspace::test {
@@ -284,6 +288,33 @@ std::vector<NamedComplex> SevenComplexes() {
   all.push_back({"fin_free", fin, {1}});
   all.push_back({"fin_wall", CubeWithWall(), {1}});
   return all;
+}
+
+TestSurface SurfaceOf(const std::string& name) {
+  const char* const folder = std::getenv("WELLSPACE_DATA_DIR");
+  std::ifstream file((folder == nullptr ? std::string("tests/data") : folder) + "/surfaces/" + name + ".off");
+  std::string word;
+  size_t points = 0;
+  size_t faces = 0;
+  size_t edges = 0;
+  file >> word >> points >> faces >> edges;
+  TestSurface surface;
+  surface.points.resize(3 * points);
+  for (double& x : surface.points) {
+    file >> x;
+  }
+  std::getline(file, word);
+  for (size_t f = 0; f < faces; ++f) {
+    std::getline(file, word);
+    std::istringstream row(word);
+    int count = 0;
+    std::array<uint32_t, 3> of{};
+    int32_t marker = 0;
+    row >> count >> of[0] >> of[1] >> of[2];
+    row >> marker;
+    surface.AddTriangle(of, marker);
+  }
+  return surface;
 }
 
 }  // namespace wellspace::test

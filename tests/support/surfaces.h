@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <string>
 #include <vector>
 
 #include "core/features/surface_features.h"
@@ -35,6 +36,8 @@ TestSurface Boxes(const std::vector<double>& x, const std::vector<double>& y, co
 TestSurface Cube();
 // A sphere of 20 * 4^depth triangles.
 TestSurface Sphere(int depth, const core::Point<3>& centre = {0, 0, 0}, double radius = 1);
+// The part `name` of tests/data/surfaces; its faces have fourth numbers for markers, or none.
+TestSurface SurfaceOf(const std::string& name);
 // Every triangle as four.
 TestSurface Subdivided(const TestSurface& surface);
 // Both, over points of their own.

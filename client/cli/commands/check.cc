@@ -15,20 +15,22 @@
 #include "client/cli/commands/commands.h"
 #include "client/cli/domain_options.h"
 #include "client/cli/exit_codes.h"
+#include "client/cli/face_rules.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/mesh_paths.h"
 #include "client/cli/options.h"
 #include "client/cli/parameter_options.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/remote_command.h"
-#include "client/cli/render/histograms.h"
-#include "client/cli/render/picture_format.h"
 #include "client/cli/size_field_options.h"
+#include "client/cli/surface_check.h"
 #include "client/formats/domain/read_planar_domain.h"
 #include "client/formats/file_plan.h"
 #include "client/formats/io/input_file.h"
 #include "client/formats/io/line_reader.h"
 #include "client/formats/read_cloud.h"
+#include "client/render/histograms.h"
+#include "client/render/picture_format.h"
 #include "core/base/status_macros.h"
 #include "core/validate/validate.h"
 #include "core/validate/validate_boundary.h"
@@ -37,9 +39,19 @@
 namespace wellspace::cli {
 namespace {
 
-// How flat a sliver is, for what is reported of a mesh. Unit: degrees.
+// The dihedral angles below which a report counts slivers. Unit: degrees.
 constexpr int kFlat = 5;
 constexpr int kSliver = 12;
+
+core::Criterion CriterionToCore(client::Criterion criterion) {
+  switch (criterion) {
+    case client::Criterion::kWellSpaced:
+      return core::Criterion::kWellSpaced;
+    case client::Criterion::kRadiusEdge:
+      break;
+  }
+  return core::Criterion::kRadiusEdge;
+}
 
 Json ReportJson(const core::QualityReport& report, int dimension, bool has_weights,
                 const std::vector<formats::BoundaryPart>& boundary) {
@@ -148,6 +160,7 @@ struct CheckCommand {
   std::string mesh_path;
   std::string cloud_path;
   DomainOptions domain_options;
+  SurfaceCheck surface;
   std::vector<double> domain_box;
   std::optional<Length> merge;
   formats::CloudOptions cloud_options;
@@ -172,17 +185,20 @@ struct CheckCommand {
   bool IsCloudADomain() const {
     return !cloud_path.empty() && domain_options.IsDomain(cloud_path, cloud_options.format);
   }
-  // What the mesh has to meet. REQUIRES: `sizes` and `cloud` outlive the result.
+  // The demands on the mesh. REQUIRES: `sizes` and `cloud` outlive the result.
   core::ValidationOptions ValidationFor(const WantedSizes& sizes, std::span<const double> cloud, int dimension) const;
-  // Refuses what is asked of a box, and not of a domain with segments.
+  // Refuses options for a box that a domain with segments does not have.
   absl::Status CheckOptionsOfDomain() const;
-  // Holds the mesh of a domain to what that has to be, and to the domain of --cloud, whose points are `points`.
+  // Checks the mesh of a domain: by its own rules, and against the domain of --cloud, whose points are `points`.
   absl::Status ValidateDomain(const formats::Mesh& mesh, const core::MeshView& view,
                               std::span<const double> points) const;
-  // Holds the mesh to what it has to meet, its boundary too. `cloud`: the points of --cloud.
+  // Holds the mesh to its demands, its boundary too. `cloud`: the points of --cloud. `json`: the report.
   absl::Status Validate(const formats::Mesh& mesh, const core::MeshView& view, const WantedSizes& sizes,
-                        std::span<const double> cloud) const;
-  // Prints the end of the report, and returns the exit code. `json`: what is reported so far.
+                        std::span<const double> cloud, Json& json) const;
+  // The part of that about sizes and angles alone.
+  absl::Status ValidateShapes(const core::MeshView& view, const WantedSizes& sizes,
+                              std::span<const double> cloud) const;
+  // Prints the end of the report, and returns the exit code. `json`: the report so far.
   int Conclude(const absl::Status& violation, const CloudReport& cloud, const formats::Mesh& mesh, Json json) const;
   int Run();
 };
@@ -203,10 +219,10 @@ absl::StatusOr<WantedSizes> CheckCommand::Sizes(int dimension) {
   return sizes;
 }
 
-// Whether a part of the boundary has a name that it has in a domain with segments alone, or a facet lies on no face of
+// Whether a part of the boundary has a name that it has in a domain with features alone, or a facet lies on no face of
 // the mesh's bounding box: then it is such a domain.
-bool HasSegments(const formats::Mesh& mesh) {
-  if (mesh.dimension != 2 || mesh.facets.empty()) {
+bool HasFeatures(const formats::Mesh& mesh) {
+  if ((mesh.dimension != 2 && mesh.dimension != 3) || mesh.facets.empty()) {
     return false;
   }
   for (const formats::BoundaryPart& part : mesh.boundary) {
@@ -216,15 +232,18 @@ bool HasSegments(const formats::Mesh& mesh) {
   }
   const formats::MeshShape shape = mesh.View().Shape();
   const uint64_t vertices = mesh.View().vertex_count();
-  for (size_t f = 0; f < mesh.facets.size(); f += 2) {
-    if (mesh.facets[f] >= vertices || mesh.facets[f + 1] >= vertices) {
+  const auto d = static_cast<size_t>(mesh.dimension);
+  for (size_t f = 0; f < mesh.facets.size(); f += d) {
+    const auto corners = std::span(mesh.facets).subspan(f, d);
+    if (std::any_of(corners.begin(), corners.end(), [&](uint32_t v) { return v >= vertices; })) {
       return true;  // the validator tells which
     }
-    const double* const p = &mesh.points[2 * size_t{mesh.facets[f]}];
-    const double* const q = &mesh.points[2 * size_t{mesh.facets[f + 1]}];
     bool is_on_face = false;
-    for (int axis = 0; axis < 2; ++axis) {
-      is_on_face = is_on_face || (p[axis] == q[axis] && (p[axis] == shape.low[axis] || p[axis] == shape.high[axis]));
+    for (size_t axis = 0; axis < d; ++axis) {
+      for (const double face : {shape.low[axis], shape.high[axis]}) {
+        is_on_face = is_on_face || std::all_of(corners.begin(), corners.end(),
+                                               [&](uint32_t v) { return mesh.points[d * v + axis] == face; });
+      }
     }
     if (!is_on_face) {
       return true;
@@ -250,7 +269,7 @@ core::BoundaryView BoundaryOf(const formats::Mesh& mesh, std::span<const int32_t
   return boundary;
 }
 
-// What the checks call seeds.
+// The seeds as the checks take them.
 std::vector<core::FaceSeed> SeedsOf(const client::Features& features) {
   std::vector<core::FaceSeed> seeds;
   for (const client::FaceSeed& seed : features.seeds) {
@@ -279,10 +298,7 @@ absl::Status CheckCommand::ValidateDomain(const formats::Mesh& mesh, const core:
   domain.features.is_open = given.is_open;
   domain.features.seeds = seeds;
   domain.features.groups = given.groups;
-  domain.features.faces = given.faces == client::FaceRule::kHoles     ? core::FaceRule::kHoles
-                          : given.faces == client::FaceRule::kEvenOdd ? core::FaceRule::kEvenOdd
-                          : given.faces == client::FaceRule::kUnion   ? core::FaceRule::kUnion
-                                                                      : core::FaceRule::kBox;
+  domain.features.faces = CoreFaceRuleOf(given.faces);
   domain.merge_distance = MergeDistance(points, 2);
   domain.has_markers = domain_options.KnowsMarkers();
   domain.has_regions = domain_options.KnowsRegions();
@@ -307,6 +323,7 @@ absl::Status CheckCommand::CheckFiles() const {
   formats::FilePlan files;
   files.ReadsMesh("MESH", mesh_path);
   files.Reads("--cloud", cloud_path);
+  surface.AddFilesTo(files);
   size_field.AddFilesTo(files);
   files.Writes("--plot", plot_path);
   files.Writes("the figures", std::string(formats::kStandardStream));
@@ -331,9 +348,8 @@ absl::StatusOr<std::vector<double>> CheckCommand::ReadCloudOf(int dimension, Clo
 
 core::ValidationOptions CheckCommand::ValidationFor(const WantedSizes& sizes, std::span<const double> cloud,
                                                     int dimension) const {
-  const bool is_well_spaced = criterion == client::Criterion::kWellSpaced;
   return {.rho = rho,
-          .criterion = is_well_spaced ? core::Criterion::kWellSpaced : core::Criterion::kRadiusEdge,
+          .criterion = CriterionToCore(criterion),
           .max_circumradius = max_circumradius.value_or(0),
           .size_boxes = sizes.boxes,
           .size_samples = &sizes.samples,
@@ -345,7 +361,11 @@ core::ValidationOptions CheckCommand::ValidationFor(const WantedSizes& sizes, st
 
 absl::Status CheckCommand::CheckOptionsOfDomain() const {
   if (criterion == client::Criterion::kWellSpaced) {
-    return absl::InvalidArgumentError("--criterion well-spaced: a domain with segments has the radius-edge one alone");
+    return absl::InvalidArgumentError(
+        "--criterion well-spaced: a domain with segments or triangles has the radius-edge one alone");
+  }
+  if (!cloud_path.empty() && surface.IsAsked()) {
+    return absl::InvalidArgumentError("--cloud: the points of a surface need not be vertices; leave it out");
   }
   if (!cloud_path.empty() && !IsCloudADomain()) {
     return absl::InvalidArgumentError(absl::StrCat(
@@ -359,19 +379,29 @@ absl::Status CheckCommand::CheckOptionsOfDomain() const {
   return absl::OkStatus();
 }
 
+absl::Status CheckCommand::ValidateShapes(const core::MeshView& view, const WantedSizes& sizes,
+                                          std::span<const double> cloud) const {
+  const core::ValidationOptions options = ValidationFor(sizes, cloud, view.dimension);
+  WELLSPACE_RETURN_IF_ERROR(core::ValidateSizing(
+      view, {options.max_circumradius, options.size_boxes, options.size_samples, options.gradation}));
+  const double least = core::MeasureQuality(view).min_angle_deg;
+  return least >= options.min_angle_deg
+             ? absl::OkStatus()
+             : absl::FailedPreconditionError(
+                   absl::StrFormat("the smallest angle is %.6g\u00b0, less than %.6g", least, options.min_angle_deg));
+}
+
 absl::Status CheckCommand::Validate(const formats::Mesh& mesh, const core::MeshView& view, const WantedSizes& sizes,
-                                    std::span<const double> cloud) const {
-  if (HasSegments(mesh) || IsCloudADomain()) {
+                                    std::span<const double> cloud, Json& json) const {
+  if (surface.IsAsked() || (mesh.dimension == 3 && HasFeatures(mesh))) {
+    WELLSPACE_RETURN_IF_ERROR(CheckOptionsOfDomain());
+    WELLSPACE_RETURN_IF_ERROR(surface.Check(mesh, rho, format, json));
+    return ValidateShapes(view, sizes, {});
+  }
+  if (HasFeatures(mesh) || IsCloudADomain()) {
     WELLSPACE_RETURN_IF_ERROR(CheckOptionsOfDomain());
     WELLSPACE_RETURN_IF_ERROR(ValidateDomain(mesh, view, cloud));
-    const core::ValidationOptions options = ValidationFor(sizes, cloud, mesh.dimension);
-    WELLSPACE_RETURN_IF_ERROR(core::ValidateSizing(
-        view, {options.max_circumradius, options.size_boxes, options.size_samples, options.gradation}));
-    const double least = core::MeasureQuality(view).min_angle_deg;
-    return least >= options.min_angle_deg
-               ? absl::OkStatus()
-               : absl::FailedPreconditionError(
-                     absl::StrFormat("the smallest angle is %.6g\u00b0, less than %.6g", least, options.min_angle_deg));
+    return ValidateShapes(view, sizes, cloud);
   }
   const absl::Status status = core::ValidateMesh(view, ValidationFor(sizes, cloud, mesh.dimension));
   if (!status.ok() || mesh.boundary.empty()) {
@@ -447,9 +477,9 @@ int CheckCommand::Run() {
         return ReportError(plotted, format);
       }
     }
-    status = Validate(*mesh, view, *sizes, *cloud);
+    status = Validate(*mesh, view, *sizes, *cloud, json);
   }
-  if (absl::IsInvalidArgument(status)) {  // what was asked for cannot be
+  if (absl::IsInvalidArgument(status)) {  // the request cannot be met
     return ReportError(size_field.WithOrigins(status), format);
   }
   return Conclude(status, cloud_report, *mesh, std::move(json));
@@ -462,7 +492,8 @@ void AddCheckCommand(CLI::App& app, int& exit_code) {
   CLI::App* check = app.add_subcommand("check",
                                        "Check a mesh: indices, orientation, topology, exact total volume, the Delaunay "
                                        "property or, with weights, that of their regular triangulation, "
-                                       "circumcentres, that tagged facets are the boundary, and what the options ask "
+                                       "circumcentres, that tagged facets are the boundary, of a domain with "
+                                       "segments or triangles that these bound it, and what the options ask "
                                        "for; print its figures and `valid` or the first violation");
   check->footer(kExitCodesHelp);
   AddMeshInput(*check, command->mesh_path);
@@ -477,6 +508,7 @@ void AddCheckCommand(CLI::App& app, int& exit_code) {
             "takes it")
       ->needs("--cloud");
   AddCloudOptions(*check, command->cloud_options, "the cloud", formats::DomainOnlyFormats());
+  command->surface.AddTo(*check);
   command->domain_options.AddReadingTo(*check, "The cloud");
   command->domain_options.AddSnapTo(*check,
                                     "Segments may be as far from their places as mesh --snap LENGTH leads them");
@@ -496,7 +528,8 @@ void AddCheckCommand(CLI::App& app, int& exit_code) {
   AddNumber(*check, "--min-dihedral", command->min_dihedral,
             "Bound on the dihedral angles, in 2-D on the angles, in degrees; default: not checked")
       ->check(AboveZero());
-  check->add_option("--plot", command->plot_path, "Draw histograms of angles and radius-edge ratios, .png or .svg")
+  check
+      ->add_option("--plot", command->plot_path, "Draw histograms of angles and radius-edge ratios, .png, .svg or .pdf")
       ->type_name("FILE");
   AddOutput(*check, command->format);
   check->callback([command, &exit_code] {

@@ -12,8 +12,10 @@ void AddCommands(CLI::App& app, int& exit_code) {
   AddConvertCommand(app, exit_code);
   AddInfoCommand(app, exit_code);
   AddCheckCommand(app, exit_code);
+  AddPartitionCommand(app, exit_code);
   AddRenderCommand(app, exit_code);
   AddViewCommand(app, exit_code);
+  AddConsoleCommand(app, exit_code);
   AddServerCommands(app, exit_code);
   AddCompletionCommands(app, exit_code);
 }

@@ -12,13 +12,15 @@ void AddMeshCommand(CLI::App& app, int& exit_code);
 void AddEstimateCommand(CLI::App& app, int& exit_code);
 void AddSessionCommands(CLI::App& app, int& exit_code);    // session create, list, show, update, delete
 void AddTransferCommands(CLI::App& app, int& exit_code);   // upload, download
-void AddOperationCommands(CLI::App& app, int& exit_code);  // refine, watch, cancel
+void AddOperationCommands(CLI::App& app, int& exit_code);  // refine, watch, jobs, cancel
 void AddQueryCommands(CLI::App& app, int& exit_code);      // cells, add
 void AddConvertCommand(CLI::App& app, int& exit_code);
 void AddInfoCommand(CLI::App& app, int& exit_code);
 void AddCheckCommand(CLI::App& app, int& exit_code);
+void AddPartitionCommand(CLI::App& app, int& exit_code);
 void AddRenderCommand(CLI::App& app, int& exit_code);
 void AddViewCommand(CLI::App& app, int& exit_code);
+void AddConsoleCommand(CLI::App& app, int& exit_code);
 void AddServerCommands(CLI::App& app, int& exit_code);      // server info, health
 void AddCompletionCommands(CLI::App& app, int& exit_code);  // completion bash, manual
 

@@ -41,27 +41,6 @@ struct ConvertCommand {
   absl::Status Convert();
 };
 
-// The tag of a vertex is the least of its facets. Formats that hold origins get them only if they are known.
-void MarkVertices(const std::string& output, const std::string& format, formats::Mesh& mesh) {
-  const uint64_t vertices = mesh.View().vertex_count();
-  const bool has_origins = mesh.vertex_origins.size() == vertices;
-  const std::string by_name = format.empty() ? output : "." + format;
-  const bool is_node = by_name.ends_with(".node") || by_name.ends_with(".ele");
-  if (mesh.boundary.empty() || (!has_origins && !is_node)) {
-    mesh.vertex_origins.clear();
-    return;
-  }
-  mesh.vertex_origins.resize(vertices, formats::kSteinerOrigin);
-  mesh.vertex_tags.assign(vertices, 0);
-  size_t corner = 0;
-  for (const formats::BoundaryPart& part : mesh.boundary) {
-    for (const size_t end = corner + part.facets * mesh.dimension; corner < end; ++corner) {
-      int32_t& tag = mesh.vertex_tags[mesh.facets[corner]];
-      tag = tag == 0 ? part.tag : std::min(tag, part.tag);
-    }
-  }
-}
-
 absl::Status ConvertCommand::Convert() {
   formats::FilePlan files;
   files.ReadsMesh("IN", input);
@@ -73,7 +52,9 @@ absl::Status ConvertCommand::Convert() {
   if (no_attributes) {
     read.attributes.clear();
   }
-  MarkVertices(output, mesh_format, read.mesh);
+  // Formats that hold origins get them only if they are known; .node has markers of vertices without.
+  const std::string by_name = mesh_format.empty() ? output : "." + mesh_format;
+  MarkVertices(by_name.ends_with(".node") || by_name.ends_with(".ele"), read.mesh);
   const formats::MeshView view = read.View();
   CloudReport report = ReportOf(cloud_options, read.notes, read.skipped);
   PrintNotes(report, format, /*quiet=*/false);

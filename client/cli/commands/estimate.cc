@@ -50,9 +50,10 @@ int RunEstimate(MeshingOptions& options) {
 
 void AddEstimateCommand(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<MeshingOptions>();
-  CLI::App* estimate = app.add_subcommand("estimate",
-                                          "Estimate how large the mesh of a point cloud, or of a domain in the plane, "
-                                          "would be, and the memory that meshing it would take");
+  CLI::App* estimate =
+      app.add_subcommand("estimate",
+                         "Estimate how large the mesh of a point cloud, of a domain in the plane, or of "
+                         "the inside of a surface would be, and the memory that meshing it would take");
   estimate->footer(absl::StrCat(kCloudsHelp, kEstimateExamples, "\n", kExitCodesHelp));
   options->AddTo(*estimate);
   estimate->callback([options, &exit_code] { exit_code = RunEstimate(*options); });

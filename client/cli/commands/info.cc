@@ -1,10 +1,12 @@
-// wellspace info: what is in a file?
+// wellspace info: the content of a file.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iostream>
 #include <limits>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -16,6 +18,7 @@
 #include "client/cli/helpful_threads.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/json.h"
+#include "client/cli/labelled_lines.h"
 #include "client/cli/meshing_options.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/remote_command.h"
@@ -23,7 +26,7 @@
 #include "client/cli/surface_options.h"
 #include "client/formats/mesh_or_cloud.h"
 #include "core/base/status_macros.h"
-#include "core/surface_report.h"
+#include "core/input/surface_report.h"
 #include "core/validate/validate.h"
 
 namespace wellspace::cli {
@@ -77,6 +80,76 @@ Json AttributeJson(const formats::PointAttribute& attribute) {
           {"missing", missing}};
 }
 
+using Vector = std::array<double, 3>;
+
+// From the first of `vertices` to number k of them; in 2-D the third coordinate is 0.
+Vector WayTo(size_t k, std::span<const uint32_t> vertices, const formats::Mesh& mesh) {
+  const auto d = static_cast<size_t>(mesh.dimension);
+  Vector way{};
+  for (size_t axis = 0; axis < d; ++axis) {
+    way[axis] = mesh.points[d * vertices[k] + axis] - mesh.points[d * vertices[0] + axis];
+  }
+  return way;
+}
+
+Vector CrossOf(const Vector& a, const Vector& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+// The length, area or volume of the simplex of 2, 3 or 4 vertices, in 2-D or 3-D.
+double MeasureOf(std::span<const uint32_t> vertices, const formats::Mesh& mesh) {
+  const Vector a = WayTo(1, vertices, mesh);
+  if (vertices.size() == 2) {
+    return std::hypot(a[0], a[1], a[2]);
+  }
+  const Vector normal = CrossOf(a, WayTo(2, vertices, mesh));
+  if (vertices.size() == 3) {
+    return std::hypot(normal[0], normal[1], normal[2]) / 2;
+  }
+  const Vector c = WayTo(3, vertices, mesh);
+  return std::abs(normal[0] * c[0] + normal[1] * c[1] + normal[2] * c[2]) / 6;
+}
+
+// The measure of each row of vertices, added up by label(row).
+template <typename LabelOf>
+std::map<int32_t, double> MeasuresBy(const LabelOf& label_of, std::span<const uint32_t> rows, size_t row,
+                                     const formats::Mesh& mesh) {
+  std::map<int32_t, double> measures;
+  for (size_t i = 0; i < rows.size() / row; ++i) {
+    measures[label_of(i)] += MeasureOf(rows.subspan(row * i, row), mesh);
+  }
+  return measures;
+}
+
+// Whether sizes can be told: in 2-D and 3-D, of vertices that there are.
+bool IsMeasurable(const formats::Mesh& mesh) {
+  const uint64_t vertices = mesh.View().vertex_count();
+  const auto is_one = [&](uint32_t v) { return v < vertices; };
+  return (mesh.dimension == 2 || mesh.dimension == 3) &&
+         std::all_of(mesh.simplices.begin(), mesh.simplices.end(), is_one) &&
+         std::all_of(mesh.facets.begin(), mesh.facets.end(), is_one);
+}
+
+// The word for the measure of a simplex, or a facet.
+const char* MeasureName(int dimension) { return dimension == 3 ? "volume" : dimension == 2 ? "area" : "length"; }
+
+Json BoundaryJson(const formats::Mesh& mesh) {
+  std::vector<int32_t> tags;
+  Json boundary = Json::array();
+  for (const formats::BoundaryPart& part : mesh.boundary) {
+    boundary.push_back({{"tag", part.tag}, {"name", part.name}, {"facets", part.facets}});
+    tags.insert(tags.end(), part.facets, part.tag);
+  }
+  const auto d = static_cast<size_t>(mesh.dimension);
+  if (!boundary.empty() && IsMeasurable(mesh) && mesh.facets.size() == d * tags.size()) {
+    std::map<int32_t, double> sizes = MeasuresBy([&](size_t f) { return tags[f]; }, mesh.facets, d, mesh);
+    for (Json& part : boundary) {
+      part[MeasureName(mesh.dimension - 1)] = sizes[part["tag"]];
+    }
+  }
+  return boundary;
+}
+
 Json RegionsJson(const formats::Mesh& mesh) {
   std::map<int32_t, uint64_t> sizes;
   for (const int32_t region : mesh.simplex_regions) {
@@ -88,6 +161,16 @@ Json RegionsJson(const formats::Mesh& mesh) {
   Json regions = Json::array();
   for (const formats::Region& region : mesh.regions) {
     regions.push_back({{"id", region.id}, {"name", region.name}, {"simplices", sizes[region.id]}});
+  }
+  if (!regions.empty() && IsMeasurable(mesh)) {
+    const auto region_of = [&](size_t s) {
+      return mesh.simplex_regions.empty() ? mesh.regions[0].id : mesh.simplex_regions[s];
+    };
+    std::map<int32_t, double> measures =
+        MeasuresBy(region_of, mesh.simplices, static_cast<size_t>(mesh.dimension) + 1, mesh);
+    for (Json& region : regions) {
+      region[MeasureName(mesh.dimension)] = measures[region["id"]];
+    }
   }
   return regions;
 }
@@ -124,31 +207,22 @@ Json InfoJson(const std::string& path, const formats::MeshOrCloud& read) {
   }
   json["simplices"] = view.simplex_count();
   json["weights"] = !view.weights.empty();
-  json["boundary"] = Json::array();
-  for (const formats::BoundaryPart& part : view.boundary) {
-    json["boundary"].push_back({{"tag", part.tag}, {"name", part.name}, {"facets", part.facets}});
-  }
+  json["boundary"] = BoundaryJson(read.mesh);
   json["regions"] = RegionsJson(read.mesh);
   json["quality"] = QualityJson(read.mesh);
   return json;
-}
-
-void PrintLine(const std::string& label, const std::string& text) {
-  std::cout << absl::StrFormat("%-20s %s\n", label, text);
-}
-
-std::string Numbers(const Json& numbers) {
-  std::string text;
-  for (const Json& number : numbers) {
-    absl::StrAppend(&text, text.empty() ? "" : ", ", absl::StrFormat("%.9g", number.get<double>()));
-  }
-  return text;
 }
 
 // "3 north", or the number alone.
 std::string Numbered(const Json& row, const char* number) {
   const std::string name = row["name"];
   return absl::StrCat(row[number].get<int32_t>(), name.empty() ? "" : " ", name);
+}
+
+// ", area 0.5", or nothing where it is not known.
+std::string MeasureText(const Json& row, int dimension) {
+  const char* const name = MeasureName(dimension);
+  return row.contains(name) ? absl::StrFormat(", %s %.9g", name, row[name].get<double>()) : "";
 }
 
 void PrintInfo(const Json& json) {
@@ -179,10 +253,12 @@ void PrintInfo(const Json& json) {
     return;
   }
   for (const Json& part : json["boundary"]) {
-    PrintLine("boundary", absl::StrCat(Numbered(part, "tag"), ": ", WithThousands(part["facets"]), " facets"));
+    PrintLine("boundary", absl::StrCat(Numbered(part, "tag"), ": ", WithThousands(part["facets"]), " facets",
+                                       MeasureText(part, json["dimension"].get<int>() - 1)));
   }
   for (const Json& region : json["regions"]) {
-    PrintLine("region", absl::StrCat(Numbered(region, "id"), ": ", WithThousands(region["simplices"]), " simplices"));
+    PrintLine("region", absl::StrCat(Numbered(region, "id"), ": ", WithThousands(region["simplices"]), " simplices",
+                                     MeasureText(region, json["dimension"])));
   }
   if (const Json& quality = json["quality"]; !quality.is_null()) {
     const char* angle = json["dimension"] == 2 ? "angles" : "dihedral angles";
@@ -202,7 +278,7 @@ absl::Status InfoCommand::RunOnSurface(int& exit_code) {
   }
   const CloudReport notes = ReportOf(cloud_options, surface.notes, 0);
   PrintNotes(notes, format, /*quiet=*/false);
-  Json json = SurfaceJson(path, surface, features, *report);
+  Json json = SurfaceJson(surface_options.FilesFrom(path), surface, features, *report);
   if (format == OutputFormat::kJson) {
     AddNotes(notes, json);
     PrintJson(json);
@@ -241,13 +317,15 @@ void AddInfoCommand(CLI::App& app, int& exit_code) {
       "info",
       "Tell what is in a file of a mesh, of a surface or of points: format, dimension, counts, bounds, attributes, of "
       "a "
-      "mesh its boundary, regions and the quality of its simplices, and of a surface its volume, creases, and every "
+      "mesh its boundary and regions with their sizes, the quality of its simplices, and of a surface its volume, "
+      "creases, and every "
       "fault that keeps it from bounding a solid, with its place");
   info->footer(absl::StrCat(kCloudsHelp, kInfoExamples, "\n", kExitCodesHelp));
   info->add_option("FILE", command->path,
                    "File of a mesh, of a surface or of points, or - for points on standard input")
       ->required()
       ->type_name("FILE");
+  command->surface_options.AddMoreTo(*info, "FILE");
   AddCloudOptions(*info, command->cloud_options, "FILE", {"smesh", "poly"});
   command->surface_options.AddTo(*info, "FILE");
   AddOutput(*info, command->format);

@@ -1,4 +1,4 @@
-// wellspace mesh: a mesh of a cloud or a domain.
+// wellspace mesh: a mesh of a cloud, or of the features that bound a domain.
 #include <iostream>
 #include <memory>
 #include <string>
@@ -15,6 +15,7 @@
 #include "client/formats/file_plan.h"
 #include "client/formats/io/input_file.h"
 #include "client/formats/io/line_reader.h"
+#include "client/json/statistics.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::cli {
@@ -24,6 +25,7 @@ constexpr char kMeshExamples[] =
     "Examples:\n"
     "  wellspace mesh coast.csv -o coast.vtu --rho 1.5 --stats -\n"
     "  wellspace mesh lake.geojson -o lake.msh --size 0.01\n"
+    "  wellspace mesh part.stl -o part.vtu --facet-length 2%\n"
     "  wellspace mesh cow.csv -o cow.node --domain -1,-1,-1,1,1,1 --server mesher:7233\n"
     "  wellspace mesh cow.csv -o cow.vtu --size 0.2 --size-box -0.5,0,0,0,0.5,0.5,0.05\n"
     "  wellspace mesh cow.csv -o cow.vtu --size-field sizes.csv --gradation 0.2\n";
@@ -60,6 +62,7 @@ absl::Status MeshCommand::Mesh(client::Client& client, const client::MeshOptions
   client::MeshFile file(output, format, call.stop);
   file.KeepInputVertices();
   file.AddAttributes(cloud.attributes);
+  file.NameParts(options.PartNames());
   if (no_boundary) {
     file.LeaveOutBoundary();
   }
@@ -71,10 +74,11 @@ absl::Status MeshCommand::Mesh(client::Client& client, const client::MeshOptions
       return status;
     }
   }
-  std::vector<std::string> notes = options.NotesOf(file.header().statistics.domain);
+  std::vector<std::string> notes = options.NotesOf(file.header().statistics);
   const std::vector<std::string> of_file = file.notes();
   notes.insert(notes.end(), of_file.begin(), of_file.end());
-  WELLSPACE_RETURN_IF_ERROR(options.WriteStatistics(StatisticsJson(file.header(), file.input_vertex()), notes));
+  WELLSPACE_RETURN_IF_ERROR(
+      options.WriteStatistics(client::StatisticsJson(file.header(), file.input_vertex()).dump(2) + "\n", notes));
   PrintNotes({.notes = notes}, options.remote().format(), options.remote().quiet());
   if (!options.remote().quiet()) {
     std::cerr << Summary(file.header()) << (output == formats::kStandardStream ? "" : " -> " + output) << "\n";
@@ -103,7 +107,7 @@ int MeshCommand::Run() {
 
 void AddMeshCommand(CLI::App& app, int& exit_code) {
   const auto command = std::make_shared<MeshCommand>();
-  CLI::App* mesh = app.add_subcommand("mesh", "Mesh a point cloud, or a domain in the plane");
+  CLI::App* mesh = app.add_subcommand("mesh", "Mesh a point cloud, a domain in the plane, or the inside of a surface");
   mesh->footer(absl::StrCat(kCloudsHelp, kMeshesHelp, kMeshExamples, "\n", kExitCodesHelp));
   command->options.AddTo(*mesh);
   AddMeshOutput(*mesh, command->output, command->format, command->no_boundary);

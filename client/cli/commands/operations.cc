@@ -1,11 +1,15 @@
-// wellspace refine, watch, cancel: the long work on a session.
+// wellspace refine, watch, jobs, cancel: the long work on a session.
+#include <algorithm>
+#include <cstdint>
 #include <iostream>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <stop_token>
 #include <string>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "client/cli/commands/commands.h"
 #include "client/cli/parameter_options.h"
 #include "client/cli/progress_bar.h"
@@ -13,13 +17,14 @@
 #include "client/cli/session_options.h"
 #include "client/cli/size_field_options.h"
 #include "client/error_details.h"
+#include "client/overview.h"
 #include "client/printable.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::cli {
 namespace {
 
-// How an operation ended, as a status.
+// The end of an operation, as a status.
 absl::Status EndOf(const client::Operation& operation) {
   if (operation.state == client::OperationState::kSucceeded) {
     return absl::OkStatus();
@@ -37,7 +42,7 @@ absl::StatusOr<client::Operation> Follow(client::Client& client, const RemoteCom
     if (prints_events && remote.json()) {
       PrintJson(ProgressJson(progress), /*indented=*/false);
       if (!std::cout) {
-        stop.request_stop();  // what comes could not be printed either
+        stop.request_stop();  // later lines could not be printed either
       }
     }
     bar.Update(progress);
@@ -54,6 +59,42 @@ void PrintEnd(const RemoteCommand& remote, const client::Operation& operation, b
     std::cout << client::Printable(operation.name) << " succeeded: " << WithThousands(operation.progress.vertices)
               << " vertices, revision " << operation.mesh_revision << "\n";
   }
+}
+
+// The work that is queued or runs on the sessions of the caller, and how much the server has to do.
+absl::Status PrintJobs(const RemoteCommand& remote, client::Client& client, const client::CallOptions& call) {
+  WELLSPACE_ASSIGN_OR_RETURN(const client::ServerInfo info, client.GetServerInfo(call));
+  constexpr uint64_t kAll = std::numeric_limits<uint64_t>::max();
+  WELLSPACE_ASSIGN_OR_RETURN(const client::Overview overview,
+                             client::GetOverview(client, {.most = kAll, .busy_alone = true}, call));
+  if (remote.json()) {
+    Json operations = Json::array();
+    for (const client::SessionWithOperation& one : overview.sessions) {
+      operations.push_back(OperationJson(*one.operation));
+    }
+    PrintJson({{"running_jobs", info.running_jobs},
+               {"queued_jobs", info.queued_jobs},
+               {"workers", info.workers},
+               {"operations", operations}});
+    return absl::OkStatus();
+  }
+  if (!remote.quiet()) {
+    std::cout << "server: " << info.running_jobs << " jobs run on " << info.workers << " workers, " << info.queued_jobs
+              << " wait\n";
+  }
+  constexpr char kRow[] = "%-78s %-8s %-11s %5s %13s  %s\n";
+  if (!remote.quiet() && !overview.sessions.empty()) {
+    std::cout << absl::StrFormat(kRow, "OPERATION", "STATE", "PHASE", "DONE", "VERTICES", "SINCE");
+  }
+  for (const client::SessionWithOperation& one : overview.sessions) {
+    const client::Operation& operation = *one.operation;
+    std::cout << absl::StrFormat(
+        kRow, client::Printable(operation.name), StateName(operation.state),
+        client::Printable(operation.progress.phase),
+        absl::StrCat(static_cast<int>(100 * std::clamp(operation.progress.fraction, 0.0, 1.0)), "%"),
+        WithThousands(operation.progress.vertices), TimeText(operation.start_time.value_or(operation.create_time)));
+  }
+  return absl::OkStatus();
 }
 
 struct OperationCommand {
@@ -225,6 +266,17 @@ void AddOperationCommands(CLI::App& app, int& exit_code) {
   AddOperation(*watch_app, watch->name);
   watch->remote.AddTo(*watch_app, RemoteCommand::Needs::kLastingServer);
   watch_app->callback([watch, &exit_code] { exit_code = watch->Watch(); });
+
+  const auto jobs = std::make_shared<RemoteCommand>();
+  CLI::App* jobs_app = app.add_subcommand(
+      "jobs", "Print the work that waits or runs on your sessions, and how much work the server has");
+  jobs_app->footer(kExitCodesHelp);
+  jobs->AddTo(*jobs_app, RemoteCommand::Needs::kLastingServer);
+  jobs_app->callback([jobs, &exit_code] {
+    exit_code = jobs->Run([&jobs](client::Client& client, const client::CallOptions& call, const Interrupt&) {
+      return PrintJobs(*jobs, client, call);
+    });
+  });
 
   const auto cancel = std::make_shared<OperationCommand>();
   CLI::App* cancel_app =

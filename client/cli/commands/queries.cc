@@ -163,9 +163,6 @@ int CellsCommand::Run() {
   });
 }
 
-// Of points, and the numbers of vertices near them, in one call; a request has 4 MiB.
-constexpr uint64_t kBytesOfABatch = uint64_t{3} << 20;
-
 struct AddCommand {
   RemoteCommand remote;
   std::string session;
@@ -177,10 +174,6 @@ struct AddCommand {
   absl::Status CheckFiles() const;
   absl::StatusOr<formats::PointCloud> Read(const formats::CloudOptions& options, std::vector<uint32_t>* near) const;
   absl::Status Add(client::Client& client, client::CallOptions call, const Interrupt& interrupt) const;
-  // Adds the points in as many calls as it takes: those of each all or none. What was added is in `all`, on an error
-  // too.
-  absl::Status AddInBatches(client::Client& client, const formats::PointCloud& cloud, const std::vector<uint32_t>& near,
-                            client::CallOptions call, client::AddedVertices& all) const;
 };
 
 absl::Status AddCommand::CheckFiles() const {
@@ -217,48 +210,24 @@ absl::Status AddCommand::Add(client::Client& client, client::CallOptions call, c
   const CloudReport report = ReportOf(options, cloud.notes, cloud.skipped);
   PrintNotes(report, remote.format(), remote.quiet());
   call.expected_revision = expected_revision;
-  client::AddedVertices all;
-  const absl::Status status = AddInBatches(client, cloud, near, call, all);
-  // What was added stays: its vertices are told, whatever became of the rest.
-  if (remote.json() && status.ok()) {
-    Json json = {{"vertices", all.vertices}, {"revision", all.revision}};
+  std::vector<uint32_t> vertices;
+  const absl::StatusOr<client::AddedVertices> added = client.AddVertices(
+      session, cloud.points, near,
+      [&](const client::AddedVertices& some) {
+        vertices.insert(vertices.end(), some.vertices.begin(), some.vertices.end());
+      },
+      call);
+  // Added vertices stay: their numbers are told, whatever became of the rest.
+  if (remote.json() && added.ok()) {
+    Json json = {{"vertices", vertices}, {"revision", added->revision}};
     AddNotes(report, json);
     PrintJson(json);
   } else {
-    for (const uint32_t vertex : all.vertices) {
+    for (const uint32_t vertex : vertices) {
       std::cout << vertex << "\n";
     }
   }
-  return status;
-}
-
-absl::Status AddCommand::AddInBatches(client::Client& client, const formats::PointCloud& cloud,
-                                      const std::vector<uint32_t>& near, client::CallOptions call,
-                                      client::AddedVertices& all) const {
-  const auto dimension = static_cast<uint64_t>(cloud.dimension);
-  const uint64_t most = kBytesOfABatch / (dimension * sizeof(double) + sizeof(uint32_t));
-  uint64_t done = 0;
-  do {
-    const uint64_t count = std::min(most, cloud.size() - done);
-    const std::span<const double> points = std::span(cloud.points).subspan(done * dimension, count * dimension);
-    const std::span<const uint32_t> hints =
-        near.empty() ? std::span<const uint32_t>() : std::span(near).subspan(done, count);
-    absl::StatusOr<client::AddedVertices> added = client.AddVertices(session, points, hints, call);
-    if (!added.ok()) {
-      const absl::Status named =
-          WithOrigins(added.status(), 0, count, [&](uint64_t point) { return cloud.Origin(done + point); });
-      return done == 0 ? named
-                       : client::WithMessage(named, absl::StrCat(named.message(), "; the first ", done, " of ",
-                                                                 cloud.size(), " points were added before"));
-    }
-    all.vertices.insert(all.vertices.end(), added->vertices.begin(), added->vertices.end());
-    all.revision = added->revision;
-    if (call.expected_revision.has_value()) {
-      call.expected_revision = added->revision;
-    }
-    done += count;
-  } while (done < cloud.size());
-  return absl::OkStatus();
+  return added.ok() ? absl::OkStatus() : WithOrigins(added.status(), cloud);
 }
 
 }  // namespace
@@ -297,7 +266,7 @@ void AddQueryCommands(CLI::App& app, int& exit_code) {
   CLI::App* add_app = app.add_subcommand("add",
                                          "Add vertices at the points of a file, and print their numbers; refine makes "
                                          "a mesh of them. All are added or none, "
-                                         "of a file of more than 3 MiB of coordinates those of each 3 MiB");
+                                         "of more than 3 MiB of coordinates those of each 3 MiB");
   add_app->footer(absl::StrCat(kCloudsHelp, "\n", kExitCodesHelp));
   AddSession(*add_app, add->session);
   add_app->add_option("IN", add->input, "File of points, or - for standard input")->required()->type_name("FILE");

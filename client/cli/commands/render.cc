@@ -4,15 +4,18 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "client/cli/commands/commands.h"
 #include "client/cli/exit_codes.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/mesh_paths.h"
 #include "client/cli/options.h"
 #include "client/cli/remote_command.h"
-#include "client/cli/render/painter.h"
-#include "client/cli/render/scene.h"
 #include "client/formats/file_plan.h"
+#include "client/formats/io/input_file.h"
+#include "client/formats/mesh_or_cloud.h"
+#include "client/render/painter.h"
+#include "client/render/scene.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::cli {
@@ -22,33 +25,79 @@ struct RenderCommand {
   std::string mesh_path;
   std::string picture_path;
   int width = 1600;
-  std::vector<double> plane;  // empty, or normal and offset
+  std::vector<double> plane;   // empty, or normal and offset
+  std::vector<double> camera;  // empty, or the direction to it
+  std::string only;
   std::string up = "z";
   std::string colour = "auto";
+  std::string field;
   OutputFormat format = OutputFormat::kText;
 
   absl::Status Render() const;
+  absl::StatusOr<formats::MeshOrCloud> Read() const;
+  absl::StatusOr<const formats::PointAttribute*> FieldOf(const formats::MeshOrCloud& read) const;
 };
+
+// The mesh, with the data of its vertices if a field is asked for.
+absl::StatusOr<formats::MeshOrCloud> RenderCommand::Read() const {
+  if (!field.empty() && mesh_path != formats::kStandardStream) {
+    absl::StatusOr<formats::MeshOrCloud> with_data = formats::ReadMeshOrCloud(mesh_path, {.keep_attributes = true});
+    if (with_data.ok() && with_data->is_mesh) {
+      return with_data;
+    }
+  }
+  formats::MeshOrCloud read;
+  WELLSPACE_ASSIGN_OR_RETURN(read.mesh, ReadMeshInput(mesh_path));  // the error names another kind of file
+  return read;
+}
+
+// The data of vertices with the name that is asked for.
+absl::StatusOr<const formats::PointAttribute*> RenderCommand::FieldOf(const formats::MeshOrCloud& read) const {
+  std::vector<std::string> names;
+  for (const formats::PointAttribute& attribute : read.attributes) {
+    if (attribute.name == field) {
+      return &attribute;
+    }
+    names.push_back(attribute.name);
+  }
+  return absl::InvalidArgumentError(absl::StrCat("--field ", field, ": ", mesh_path, " has no such data of vertices; ",
+                                                 names.empty()
+                                                     ? "expected a .vtu, .vtk, .vtp, .14 or .2dm with some"
+                                                     : absl::StrCat("expected one of ", absl::StrJoin(names, ", "))));
+}
 
 absl::Status RenderCommand::Render() const {
   if (!plane.empty() && plane.size() != 4) {
     return absl::InvalidArgumentError(absl::StrCat("--plane: expected 4 numbers nx,ny,nz,d, got ", plane.size()));
+  }
+  if (!camera.empty() && camera.size() != 3) {
+    return absl::InvalidArgumentError(absl::StrCat("--camera: expected 3 numbers x,y,z, got ", camera.size()));
   }
   WELLSPACE_ASSIGN_OR_RETURN(const render::PictureFormat picture_format, render::PictureFormatOf(picture_path));
   formats::FilePlan files;
   files.ReadsMesh("MESH", mesh_path);
   files.Writes("--out", picture_path);
   WELLSPACE_RETURN_IF_ERROR(files.Check());
-  WELLSPACE_ASSIGN_OR_RETURN(const formats::Mesh mesh, ReadMeshInput(mesh_path));
+  WELLSPACE_ASSIGN_OR_RETURN(const formats::MeshOrCloud read, Read());
   render::View view;
+  if (!field.empty()) {
+    WELLSPACE_ASSIGN_OR_RETURN(view.field, FieldOf(read));
+    view.colouring = render::Colouring::kField;
+  }
   view.up = up[0] - 'x';
+  view.only_boundary = !only.empty();
   if (colour != "auto") {
-    view.colouring = colour == "region" ? render::Colouring::kRegion : render::Colouring::kAngle;
+    view.colouring = colour == "region"     ? render::Colouring::kRegion
+                     : colour == "boundary" ? render::Colouring::kBoundary
+                                            : render::Colouring::kAngle;
+  }
+  if (!camera.empty()) {
+    view.camera = {camera[0], camera[1], camera[2]};
   }
   if (!plane.empty()) {
     view.plane = {.normal = {plane[0], plane[1], plane[2]}, .offset = plane[3]};
   }
-  const absl::StatusOr<render::Scene> scene = render::MakeScene(mesh.View(), view);
+  const absl::StatusOr<render::Scene> scene = render::MakeScene(read.mesh.View(), view);
   if (!scene.ok()) {
     return absl::Status(scene.status().code(), absl::StrCat(mesh_path, ": ", scene.status().message()));
   }
@@ -65,24 +114,39 @@ void AddRenderCommand(CLI::App& app, int& exit_code) {
   const auto command = std::make_shared<RenderCommand>();
   CLI::App* render = app.add_subcommand(
       "render",
-      "Draw a 2-D or 3-D mesh, coloured by region or by the smallest angle of each simplex; the boundary of a 2-D mesh "
-      "is drawn, and 3-D meshes are cut open by a plane");
+      "Draw a 2-D or 3-D mesh, coloured by region, by parts of the boundary, or by the smallest angle of each simplex; "
+      "the boundary of a 2-D mesh is drawn, and 3-D meshes are cut open by a plane");
   render->footer(kExitCodesHelp);
   AddMeshInput(*render, command->mesh_path);
-  render->add_option("-o,--out", command->picture_path, "File of the picture, .png or .svg")
+  render->add_option("-o,--out", command->picture_path, "File of the picture, .png, .svg or .pdf")
       ->required()
       ->type_name("FILE");
   render->add_option("--width", command->width, "Width in pixels")
       ->capture_default_str()
       ->check(CLI::Range(render::kMinWidth, render::kMaxWidth));
-  AddNumbers(*render, "--plane", command->plane,
-             "nx,ny,nz,d: cut off what lies at n·x > d; default: half of the box, across x");
+  CLI::Option* const plane = AddNumbers(*render, "--plane", command->plane,
+                                        "nx,ny,nz,d: cut off what lies at n·x > d; default: half of the box, across x");
+  AddNumbers(*render, "--camera", command->camera,
+             "x,y,z: direction of a 3-D mesh from which it is seen; default: a little beside the normal of the plane");
+  render->add_option("--only", command->only, "boundary: a 3-D mesh as it is from outside, and nothing is cut off")
+      ->check(CLI::IsMember({"boundary"}))
+      ->excludes(plane);
   render->add_option("--up", command->up, "Axis that points upwards in the picture of a 3-D mesh")
       ->capture_default_str()
       ->check(CLI::IsMember({"x", "y", "z"}));
-  render->add_option("--colour", command->colour, "What colours mean; auto: region if the mesh has several, else angle")
+  render
+      ->add_option("--colour", command->colour,
+                   "What colours mean; auto: with --only boundary its parts if there are several, else region if the "
+                   "mesh has several, else angle")
       ->capture_default_str()
-      ->check(CLI::IsMember({"auto", "angle", "region"}));
+      ->check(CLI::IsMember({"auto", "angle", "boundary", "region"}));
+  render
+      ->add_option(
+          "--field", command->field,
+          "Colours mean these data of vertices, such as a solution; of .vtu, .vtk, .vtp, .14 and .2dm. A vector "
+          "is NAME:0, NAME:1, ...")
+      ->type_name("NAME")
+      ->excludes("--colour");
   AddOutput(*render, command->format);
   render->callback([command, &exit_code] {
     const Interrupt interrupt(Interrupt::First::kEnd);

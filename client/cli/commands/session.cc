@@ -9,6 +9,7 @@
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
 #include "client/cli/commands/commands.h"
+#include "client/cli/face_rules.h"
 #include "client/cli/options.h"
 #include "client/cli/parameter_options.h"
 #include "client/cli/progress_bar.h"
@@ -27,9 +28,7 @@ std::string LabelsText(const client::Labels& labels) {
 }
 
 std::string QualityText(const client::MeshOptions& parameters) {
-  const bool is_well_spaced = parameters.criterion == client::Criterion::kWellSpaced;
-  std::string text =
-      absl::StrFormat("%s, rho %g", is_well_spaced ? "well-spaced" : "radius-edge", parameters.rho.value_or(0));
+  std::string text = absl::StrFormat("%s, rho %g", CriterionName(parameters.criterion), parameters.rho.value_or(0));
   if (parameters.max_circumradius.has_value()) {
     absl::StrAppendFormat(&text, ", size %g", *parameters.max_circumradius);
   }
@@ -75,6 +74,11 @@ void PrintSession(const client::Session& session, bool json) {
                        session.crossings == client::CrossingRule::kSplit  ? ", crossings split"
                        : session.crossings == client::CrossingRule::kSnap ? ", snapped"
                                                                           : ""));
+  }
+  if (session.surface.has_value()) {
+    print("triangles", WithThousands(session.triangle_count));
+    print("solids", absl::StrCat(SolidRuleName(session.surface->solids), ", ", WithThousands(session.seed_count),
+                                 " holes and regions"));
   }
   if (session.size_count > 0) {
     print("sizes", absl::StrCat("at ", WithThousands(session.size_count), " points"));

@@ -1,9 +1,10 @@
-// wellspace upload, download: points and segments to a session, and its mesh to a file.
+// wellspace upload, download: points, segments or triangles to a session, and its mesh to a file.
 #include <algorithm>
 #include <iostream>
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "client/cli/cloud_options.h"
@@ -16,12 +17,13 @@
 #include "client/cli/remote_command.h"
 #include "client/cli/session_options.h"
 #include "client/cli/statistics.h"
+#include "client/cli/surface_options.h"
 #include "client/files/cloud_file.h"
 #include "client/files/mesh_file.h"
-#include "client/formats/domain/read_planar_domain.h"
 #include "client/formats/file_plan.h"
 #include "client/formats/io/input_file.h"
 #include "client/formats/io/line_reader.h"
+#include "client/json/statistics.h"
 #include "client/point_source.h"
 #include "core/base/status_macros.h"
 
@@ -34,8 +36,10 @@ struct UploadCommand {
   std::string input;
   formats::CloudOptions cloud_options;
   DomainOptions domain;
+  SurfaceOptions surface;
   std::optional<uint64_t> offset;
   std::optional<uint64_t> segment_offset;
+  std::optional<uint64_t> triangle_offset;
   std::optional<uint64_t> seed_offset;
   std::optional<uint64_t> expected_revision;
 
@@ -45,41 +49,81 @@ struct UploadCommand {
                            const Interrupt& interrupt);
   absl::Status UploadDomain(client::Client& client, const client::Session& found, const client::CallOptions& call,
                             const Interrupt& interrupt);
+  absl::Status UploadSurface(client::Client& client, const client::Session& found, const client::CallOptions& call,
+                             const Interrupt& interrupt);
+  bool IsSurface() const { return surface.IsSurface(input, cloud_options, SurfaceOptions::Poly::kByPath); }
+  // How many features were added, in a word, and where the upload stands.
+  void Print(const client::Uploaded& uploaded, const char* what, const char* field, uint64_t count, uint64_t seeds,
+             uint64_t revision, const CloudReport& report) const;
   // Sends `total` points from number `first` of the session on, and shows how far that is.
   absl::StatusOr<client::Uploaded> Send(client::Client& client, client::PointSource& source, uint64_t first,
                                         uint64_t total, const client::CallOptions& call) const;
 };
 
+// Refuses `points` points after `first` others where no feature could name the last of them.
+absl::Status CheckNumbers(uint64_t first, uint64_t points) {
+  return first <= client::kNoVertex - std::min<uint64_t>(points, client::kNoVertex)
+             ? absl::OkStatus()
+             : absl::InvalidArgumentError(absl::StrCat("--offset: after ", first,
+                                                       " points no segment or triangle can name those of IN; 2^32 - 1 "
+                                                       "points have numbers"));
+}
+
+void Shift(std::vector<uint32_t>& numbers, uint64_t by) {
+  for (uint32_t& number : numbers) {
+    number += static_cast<uint32_t>(by);
+  }
+}
+
 // Segments whose ends are numbers of points of the session, of which the first is `first`, and seeds whose polygons are
 // numbers of its segments, after `segments` others.
-absl::StatusOr<client::Features> Shifted(client::Features features, uint64_t first, uint64_t points,
-                                         uint64_t segments) {
-  if (first > client::kNoVertex - std::min<uint64_t>(points, client::kNoVertex)) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        "--offset: after ", first, " points no segment can name those of IN; 2^32 - 1 points have numbers"));
-  }
-  for (uint32_t& end : features.ends) {
-    end += static_cast<uint32_t>(first);
-  }
+client::Features Shifted(client::Features features, uint64_t first, uint64_t segments) {
+  Shift(features.ends, first);
   for (client::FaceSeed& seed : features.seeds) {
     seed.first_segment += segments;
   }
-  for (uint32_t& group : features.groups) {
-    group += static_cast<uint32_t>(segments);  // those of another file are others
-  }
+  Shift(features.groups, segments);  // those of another file are others
   return features;
 }
 
+// The server would take the points before it refuses their features.
+absl::Status CheckNotRefined(const client::Session& session, bool has_more) {
+  return session.vertex_count == 0 || !has_more
+             ? absl::OkStatus()
+             : absl::FailedPreconditionError(absl::StrCat(
+                   session.name, " has been refined; what bounds it can be added only before the first refinement"));
+}
+
+// The options of the call after an upload, whose revision the next one expects if one was expected before it.
+client::CallOptions After(const client::Uploaded& uploaded, client::CallOptions call) {
+  if (call.expected_revision.has_value()) {
+    call.expected_revision = uploaded.revision;
+  }
+  return call;
+}
+
 absl::Status UploadCommand::CheckOptions() const {
-  if (domain.IsDomain(input, cloud_options.format)) {
-    return absl::OkStatus();
+  const bool is_surface = IsSurface();
+  const bool is_domain = !is_surface && domain.IsDomain(input, cloud_options.format);
+  const auto refuse = [](const char* option, const char* what) {
+    return absl::InvalidArgumentError(absl::StrCat(option, ": ", what));
+  };
+  constexpr char kNoSegments[] = "IN has no segments; give a domain, such as a .poly or .geojson, or --segments";
+  constexpr char kNoTriangles[] =
+      "IN has no triangles; give a .stl, .smesh or 3-D .poly, or --triangles with .obj, .ply or .off";
+  if (segment_offset.has_value() && !is_domain) {
+    return refuse("--segment-offset", kNoSegments);
   }
-  if (segment_offset.has_value() || seed_offset.has_value()) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(segment_offset.has_value() ? "--segment-offset" : "--seed-offset",
-                     ": IN has points alone; give a domain, such as a .poly or .geojson, or --segments"));
+  if (triangle_offset.has_value() && !is_surface) {
+    return refuse("--triangle-offset", kNoTriangles);
   }
-  return domain.CheckCloud();
+  if (seed_offset.has_value() && !is_domain && !is_surface) {
+    return refuse("--seed-offset", kNoSegments);
+  }
+  if (!is_surface) {
+    WELLSPACE_RETURN_IF_ERROR(surface.CheckOther("IN"));
+  }
+  return is_domain ? absl::OkStatus() : domain.CheckOther(kNoSegments);
 }
 
 absl::StatusOr<client::Uploaded> UploadCommand::Send(client::Client& client, client::PointSource& source,
@@ -96,8 +140,9 @@ absl::StatusOr<client::Uploaded> UploadCommand::Send(client::Client& client, cli
 absl::Status UploadCommand::Upload(client::Client& client, client::CallOptions call, const Interrupt& interrupt) {
   WELLSPACE_ASSIGN_OR_RETURN(const client::Session found, client.GetSession(session, call));
   call.expected_revision = expected_revision;
-  return domain.IsDomain(input, cloud_options.format) ? UploadDomain(client, found, call, interrupt)
-                                                      : UploadCloud(client, found, call, interrupt);
+  return IsSurface()                                    ? UploadSurface(client, found, call, interrupt)
+         : domain.IsDomain(input, cloud_options.format) ? UploadDomain(client, found, call, interrupt)
+                                                        : UploadCloud(client, found, call, interrupt);
 }
 
 absl::Status UploadCommand::UploadCloud(client::Client& client, const client::Session& found,
@@ -142,42 +187,69 @@ absl::Status UploadCommand::UploadDomain(client::Client& client, const client::S
   const uint64_t first = offset.value_or(found.committed_points);
   const client::FeatureOffset before = {.segments = segment_offset.value_or(is_first ? 0 : found.segment_count),
                                         .seeds = seed_offset.value_or(is_first ? 0 : found.seed_count)};
-  const absl::StatusOr<client::Features> features = Shifted(*domain.features(), first, cloud->size(), before.segments);
-  if (!features.ok()) {
-    return features.status();
-  }
-  if (found.vertex_count > 0 && (before.segments + features->ends.size() / 2 > found.segment_count ||
-                                 before.seeds + features->seeds.size() > found.seed_count)) {
-    // The server would take the points before it refuses the segments.
-    return absl::FailedPreconditionError(
-        absl::StrCat(session, " has been refined; segments can be added only before the first refinement"));
-  }
+  WELLSPACE_RETURN_IF_ERROR(CheckNumbers(first, cloud->size()));
+  const client::Features features = Shifted(*domain.features(), first, before.segments);
+  WELLSPACE_RETURN_IF_ERROR(CheckNotRefined(found, before.segments + features.ends.size() / 2 > found.segment_count ||
+                                                       before.seeds + features.seeds.size() > found.seed_count));
   client::SpanSource source(cloud->dimension, cloud->points);
   const absl::StatusOr<client::Uploaded> uploaded = Send(client, source, first, cloud->size(), call);
   if (!uploaded.ok()) {
     return domain.WithOrigins(uploaded.status(), {first, before});
   }
-  client::CallOptions next = call;
-  if (expected_revision.has_value()) {
-    next.expected_revision = uploaded->revision;
-  }
-  const absl::StatusOr<client::AddedSegments> added = client.AddSegments(session, *features, before, next);
+  const absl::StatusOr<client::AddedSegments> added =
+      client.AddSegments(session, features, before, After(*uploaded, call));
   if (!added.ok()) {
     return domain.WithOrigins(added.status(), {first, before});
   }
+  Print(*uploaded, "segments", "segment_count", added->segment_count, added->seed_count, added->revision, report);
+  return absl::OkStatus();
+}
+
+absl::Status UploadCommand::UploadSurface(client::Client& client, const client::Session& found,
+                                          const client::CallOptions& call, const Interrupt& interrupt) {
+  std::optional<Interrupt::AtOnce> reading(interrupt);
+  WELLSPACE_ASSIGN_OR_RETURN(const formats::PointCloud cloud, surface.ReadInput(input, cloud_options));
+  reading.reset();
+  const CloudReport report = ReportOf(cloud_options, cloud.notes, cloud.skipped);
+  PrintNotes(report, remote.format(), remote.quiet());
+  const bool is_first = offset == 0;
+  const uint64_t first = offset.value_or(found.committed_points);
+  const client::SurfaceOffset before = {.triangles = triangle_offset.value_or(is_first ? 0 : found.triangle_count),
+                                        .seeds = seed_offset.value_or(is_first ? 0 : found.seed_count)};
+  WELLSPACE_RETURN_IF_ERROR(CheckNumbers(first, cloud.size()));
+  client::SurfaceFeatures features = *surface.features();
+  Shift(features.corners, first);
+  WELLSPACE_RETURN_IF_ERROR(
+      CheckNotRefined(found, before.triangles + features.corners.size() / 3 > found.triangle_count ||
+                                 before.seeds + features.seeds.size() > found.seed_count));
+  client::SpanSource source(cloud.dimension, cloud.points);
+  const absl::StatusOr<client::Uploaded> uploaded = Send(client, source, first, cloud.size(), call);
+  if (!uploaded.ok()) {
+    return surface.WithOrigins(uploaded.status(), {first, before});
+  }
+  const absl::StatusOr<client::AddedTriangles> added =
+      client.AddTriangles(session, features, before, After(*uploaded, call));
+  if (!added.ok()) {
+    return surface.WithOrigins(added.status(), {first, before});
+  }
+  Print(*uploaded, "triangles", "triangle_count", added->triangle_count, added->seed_count, added->revision, report);
+  return absl::OkStatus();
+}
+
+void UploadCommand::Print(const client::Uploaded& uploaded, const char* what, const char* field, uint64_t count,
+                          uint64_t seeds, uint64_t revision, const CloudReport& report) const {
   if (remote.json()) {
     Json json = {{"session", session},
-                 {"committed_points", uploaded->committed_points},
-                 {"segment_count", added->segment_count},
-                 {"seed_count", added->seed_count},
-                 {"revision", added->revision}};
+                 {"committed_points", uploaded.committed_points},
+                 {field, count},
+                 {"seed_count", seeds},
+                 {"revision", revision}};
     AddNotes(report, json);
     PrintJson(json);
   } else if (!remote.quiet()) {
-    std::cout << session << ": " << WithThousands(uploaded->committed_points) << " points, "
-              << WithThousands(added->segment_count) << " segments, revision " << added->revision << "\n";
+    std::cout << session << ": " << WithThousands(uploaded.committed_points) << " points, " << WithThousands(count)
+              << " " << what << ", revision " << revision << "\n";
   }
-  return absl::OkStatus();
 }
 
 struct DownloadCommand {
@@ -228,8 +300,9 @@ absl::Status DownloadCommand::Download(client::Client& client, const client::Cal
     }
   }
   if (remote.json()) {
-    std::cout << WithNotes({.notes = file.notes()},
-                           StatisticsJson(file.header(), file.input_vertex(), file.moved_vertices()))
+    std::cout << WithNotes(
+                     {.notes = file.notes()},
+                     client::StatisticsJson(file.header(), file.input_vertex(), file.moved_vertices()).dump(2) + "\n")
               << std::flush;
   } else if (!remote.quiet()) {
     std::cerr << Summary(file.header()) << (path == formats::kStandardStream ? "" : " -> " + path) << "\n";
@@ -243,14 +316,16 @@ absl::Status DownloadCommand::Download(client::Client& client, const client::Cal
 
 void AddUpload(CLI::App& app, int& exit_code) {
   const auto command = std::make_shared<UploadCommand>();
-  CLI::App* upload = app.add_subcommand("upload", "Add the points of a file, or a domain, to a session");
+  CLI::App* upload = app.add_subcommand("upload", "Add the points of a file, a domain or a surface to a session");
   upload->footer(absl::StrCat(kCloudsHelp, "\n", kExitCodesHelp));
   AddSession(*upload, command->session);
-  upload->add_option("IN", command->input, "File of points or of a domain, or - for standard input")
+  upload->add_option("IN", command->input, "File of points, of a domain or of a surface, or - for standard input")
       ->required()
       ->type_name("FILE");
-  AddCloudOptions(*upload, command->cloud_options, "IN", formats::DomainOnlyFormats());
+  command->surface.AddMoreTo(*upload, "IN");
+  AddCloudOptions(*upload, command->cloud_options, "IN", InputFormats());
   command->domain.AddTo(*upload);
+  command->surface.AddMeshingTo(*upload, "IN");
   AddCount(
       *upload, "--offset", [command](uint64_t offset) { command->offset = offset; },
       "Number of the session's points before the first of IN. What is there from it on has to be the same as in IN, "
@@ -260,8 +335,12 @@ void AddUpload(CLI::App& app, int& exit_code) {
       *upload, "--segment-offset", [command](uint64_t offset) { command->segment_offset = offset; },
       "Of a domain: the same of the session's segments; default: 0 with --offset 0, else after them");
   AddCount(
+      *upload, "--triangle-offset", [command](uint64_t offset) { command->triangle_offset = offset; },
+      "Of a surface: the same of the session's triangles; default: 0 with --offset 0, else after them");
+  AddCount(
       *upload, "--seed-offset", [command](uint64_t offset) { command->seed_offset = offset; },
-      "Of a domain: the same of the session's holes and regions; default: 0 with --offset 0, else after them");
+      "Of a domain or a surface: the same of the session's holes and regions; default: 0 with --offset 0, else after "
+      "them");
   AddExpectedRevision(*upload, command->expected_revision);
   command->remote.AddTo(*upload, RemoteCommand::Needs::kLastingServer);
   upload->callback([command, &exit_code] {

@@ -1,11 +1,7 @@
 // wellspace view: a page that shows a mesh.
-#include <unistd.h>
-
-#include <cerrno>
-#include <cstdlib>
-#include <cstring>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -20,6 +16,7 @@
 #include "client/formats/file_plan.h"
 #include "client/formats/io/input_file.h"
 #include "client/formats/io/output_file.h"
+#include "client/formats/io/temporary_folder.h"
 #include "client/formats/mesh_or_cloud.h"
 #include "client/formats/read_mesh.h"
 #include "client/viewer/page.h"
@@ -63,16 +60,6 @@ absl::StatusOr<formats::MeshOrCloud> ReadMeshWithData(const std::string& path) {
   return read;
 }
 
-// A place for the page of `name` that is nobody else's.
-absl::StatusOr<std::string> TemporaryPage(const std::string& name) {
-  const char* wanted = std::getenv("TMPDIR");
-  std::string folder = absl::StrCat(wanted == nullptr || *wanted == '\0' ? "/tmp" : wanted, "/wellspace-XXXXXX");
-  if (mkdtemp(folder.data()) == nullptr) {
-    return absl::ResourceExhaustedError(absl::StrCat(folder, ": cannot be made: ", std::strerror(errno)));
-  }
-  return absl::StrCat(folder, "/", name, ".html");
-}
-
 absl::Status WritePageTo(const std::string& path, const formats::MeshView& mesh, const viewer::PageOptions& options) {
   WELLSPACE_ASSIGN_OR_RETURN(formats::OutputFile file, formats::OutputFile::Create(path));
   viewer::WritePage(mesh, options, file);
@@ -97,14 +84,15 @@ absl::Status ViewCommand::View() const {
   PrintNotes(report, format, /*quiet=*/false);
   const std::string name = NameOf(mesh_path);
   std::string path = page_path;
+  std::optional<formats::TemporaryFolder> folder;
   if (path.empty()) {
-    WELLSPACE_ASSIGN_OR_RETURN(path, TemporaryPage(name));
+    WELLSPACE_ASSIGN_OR_RETURN(formats::TemporaryFolder made, formats::TemporaryFolder::Make());
+    path = absl::StrCat(folder.emplace(std::move(made)).path(), "/", name, ".html");
   }
-  const absl::Status written = WritePageTo(path, mesh, {.name = name, .up = up[0] - 'x'});
-  if (!written.ok() && page_path.empty()) {
-    rmdir(path.substr(0, path.find_last_of('/')).c_str());
+  WELLSPACE_RETURN_IF_ERROR(WritePageTo(path, mesh, {.name = name, .up = up[0] - 'x'}));
+  if (folder.has_value()) {
+    folder->Keep();  // a browser reads it after the end of this process
   }
-  WELLSPACE_RETURN_IF_ERROR(written);
   const bool is_open = page_path.empty() && OpenInBrowser(path);
   if (format == OutputFormat::kJson) {
     Json figures = {{"mesh", mesh_path}, {"page", path}, {"opened", is_open}};

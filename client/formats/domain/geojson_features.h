@@ -1,5 +1,5 @@
-// What becomes of the features of a file of geometries: of the properties of GeoJSON's markers and regions, and of all
-// what is noted of the file. Private to the readers of such files.
+// The treatment of the features of a file of geometries: of the properties of GeoJSON's markers and regions, and of all
+// notes on the file. Private to the readers of such files.
 #ifndef WELLSPACE_CLIENT_FORMATS_DOMAIN_GEOJSON_FEATURES_H_
 #define WELLSPACE_CLIENT_FORMATS_DOMAIN_GEOJSON_FEATURES_H_
 
@@ -19,7 +19,7 @@ class GeoJsonFeatures {
   // REQUIRES:   both outlive this.
   GeoJsonFeatures(const DomainOptions& options, PlanarDomain& domain) : options_(options), domain_(domain) {}
 
-  // Takes the property `name` of a feature: a number, or what is shown of it as `text`.
+  // Takes the property `name` of a feature: a number, or the `text` to show of it.
   //
   // Errors:     INVALID_ARGUMENT without a place: it should be a number.
   absl::Status TakeProperty(GeoJsonLevel& feature, const std::string& name, const double* number,
@@ -28,10 +28,10 @@ class GeoJsonFeatures {
   // Counts a feature or geometry without positions.
   void CountEmpty() { ++empty_; }
 
-  // Gives what the domain has got of a feature, which ends, its marker, and its polygons their region.
+  // Gives the segments of a feature, which ends, its marker, and its polygons their region.
   void End(const GeoJsonLevel& feature);
 
-  // Completes the domain once the file is read, and notes what there is to say of it.
+  // Completes the domain once the file is read, and adds its notes.
   void Finish();
 
  private:

@@ -29,11 +29,11 @@ struct GeoJsonPlace {
 //
 // Thread safety: thread-compatible.
 struct PlanarDomain {
-  // Which faces count: the whole box; all bounded faces without a hole; those that an odd number of rings surround;
+  // The faces that count: the whole box; all bounded faces without a hole; those that an odd number of rings surround;
   // those that an odd number of rings of some group surround.
   enum class FaceRule { kBox, kHoles, kEvenOdd, kUnion };
 
-  // What stands for faces: a point for the one that it is in, or a polygon for all inside of it.
+  // A seed of faces: a point for the one that it is in, or a polygon for all inside of it.
   struct Seed {
     double x = 0;
     double y = 0;
@@ -58,9 +58,9 @@ struct PlanarDomain {
   // Of each segment its group, of GeoJSON the first segment of its feature; or empty if all are of one.
   std::vector<uint32_t> groups;
   std::vector<Seed> seeds;          // holes first, then regions; of GeoJSON polygons
-  FaceRule faces = FaceRule::kBox;  // what the format means: of .poly HOLES, of polygons UNION, of lines alone BOX
+  FaceRule faces = FaceRule::kBox;  // the rule of the format: of .poly HOLES, of polygons UNION, of lines alone BOX
 
-  // What was changed, or is not used.
+  // Counts of parts that were changed, or are not used.
   uint64_t repeated_points = 0;  // dropped: equal to the one before in a ring or a line
   uint64_t unclosed_rings = 0;   // closed, though their first point is not repeated as the last
   uint64_t altitudes = 0;        // positions of GeoJSON with more than two numbers
@@ -69,10 +69,10 @@ struct PlanarDomain {
   std::string first_flat;   // where the first of both is
   uint64_t rounded_numbers = 0;  // coordinates of GeoJSON that are whole numbers above 2^53, and no doubles
   std::string first_rounded;     // the first of them, and where it is
-  // What a user would want to know of how the file was read, a sentence each.
+  // Notes for the user on how the file was read, a sentence each.
   std::vector<std::string> notes;
 
-  // Where things stand in the file; see PointOrigin. In GeoJSON `lines` of points are positions in their ring.
+  // The places of things in the file; see PointOrigin. In GeoJSON `lines` of points are positions in their ring.
   std::string points_name;  // of the file that has the points, if it is another one
   LineIndex point_lines;
   LineIndex segment_lines;

@@ -21,7 +21,7 @@ int CountDifferent(std::span<const double> positions);
 //
 // Shapes:     positions: n x 2, the first repeated at the end or not.
 // Guarantees: exact.
-// Complexity: O(n); O(n log n) of rings whose area is little beside what it is summed up of.
+// Complexity: O(n); O(n log n) of rings whose area is little beside the terms of its sum.
 bool IsFlat(std::span<const double> positions);
 
 // Adds the points and segments of a ring or a line to the domain.

@@ -4,7 +4,6 @@
 #include <utility>
 #include <vector>
 
-#include "absl/strings/str_cat.h"
 #include "client/formats/domain/domain_readers.h"
 #include "client/formats/hydro/adcirc.h"
 #include "client/formats/io/line_reader.h"

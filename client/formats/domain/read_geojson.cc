@@ -32,21 +32,21 @@ using Role = GeoJsonRole;
 // Deeper nesting is no geometry and no property of one.
 constexpr size_t kMaxNesting = 256;
 
-// `text` of another program, cut off when long, with what cannot be printed escaped.
+// `text` of another program, cut off when long, with unprintable characters escaped.
 std::string Printable(std::string_view text) {
   constexpr size_t kShown = 300;
   return absl::StrReplaceAll(absl::CHexEscape({text.data(), std::min(text.size(), kShown)}),
                              {{"\\'", "'"}, {"\\\"", "\""}});
 }
 
-// Whether what the parser stopped at, the end of `token`, may be the start of NaN or an infinity.
+// Whether the end of `token`, at which the parser stopped, may be the start of NaN or an infinity.
 bool IsLikeNan(std::string_view token) {
   token = token.substr(token.find_last_of(",[: \t\r\n") + 1);
   constexpr std::array<std::string_view, 8> kStarts = {"N", "na", "i", "I", "-N", "-n", "-i", "-I"};
   return std::find(kStarts.begin(), kStarts.end(), token) != kStarts.end();
 }
 
-// What the parser calls; true goes on, false ends it, and status() says why.
+// The callbacks of the parser; true goes on, false ends it, and status() says why.
 class GeoJsonReader {
  public:
   // `is_sequence`: the file is one of texts, of which each is a feature by itself.
@@ -455,7 +455,7 @@ absl::Status ReadGeoJson(InputFile& file, const DomainOptions& options, PlanarDo
 }
 
 absl::Status ReadGeoJsonLines(InputFile& file, const DomainOptions& options, PlanarDomain& domain) {
-  // What may stand between texts; the last is the separator of RFC 8142.
+  // The bytes that may stand between texts; the last is the separator of RFC 8142.
   constexpr std::string_view kBetween = " \t\r\n\x1e";
   JsonSource source(file);
   GeoJsonReader reader(source, options, /*is_sequence=*/true, domain);

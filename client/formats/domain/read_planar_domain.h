@@ -58,14 +58,14 @@ struct DomainOptions {
 // The names that DomainOptions::format may take.
 std::vector<std::string> DomainFormats();
 
-// Those of them whose files have a planar domain and no cloud: all but adcirc, obj and csv.
+// The formats whose files have a planar domain and no cloud: all but adcirc, obj and csv.
 std::vector<std::string> DomainOnlyFormats();
 bool IsDomainFormat(const std::string& format);
 
 // Whether the extension of `path` says that it is of such a format: .poly, .geojson and so on, also with .gz.
 bool IsDomainPath(const std::string& path);
 
-// Reads the domain of `path`; "-" is standard input. Nothing is cleaned but what PlanarDomain counts.
+// Reads the domain of `path`; "-" is standard input. Nothing is cleaned but the things that PlanarDomain counts.
 //
 // Guarantees: (1) Coordinates are correctly rounded, to the bit, and finite; ends of segments are points.
 //             (2) Every point, segment and seed has its place in the file.

@@ -13,7 +13,6 @@
 #include "client/formats/domain/geojson_geometry.h"
 #include "client/formats/domain/geojson_objects.h"
 #include "client/formats/io/input_file.h"
-#include "client/formats/io/number.h"
 #include "client/formats/vtk/vtk_array.h"
 #include "core/base/status_macros.h"
 
@@ -179,7 +178,7 @@ class ShapefileReader {
     return Move(type);
   }
 
-  // Rings are polygons of their own: an odd number of them surrounds what is inside, in whichever order they come.
+  // Rings are polygons of their own: an odd number of them surrounds the inside, in whichever order they come.
   absl::Status ReadPart(uint64_t points_at, int32_t begin, int32_t end, GeometryType type) {
     const int arrays = type == GeometryType::kMultiPoint ? 0 : type == GeometryType::kMultiPolygon ? 2 : 1;
     for (int i = 0; i < arrays && end > begin; ++i) {

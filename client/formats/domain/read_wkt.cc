@@ -55,17 +55,16 @@ class WktReader {
       GeoJsonLevel feature{
           .line = line_, .first_segment = domain_.segment_count(), .first_place = domain_.places.size()};
       WELLSPACE_RETURN_IF_ERROR(SkipSrid());
-      WELLSPACE_RETURN_IF_ERROR(ReadGeometry(/*nesting=*/0));
+      WELLSPACE_RETURN_IF_ERROR(ReadGeometry());
       features_.End(feature);
-      collection_.clear();
     }
     features_.Finish();
     return absl::OkStatus();
   }
 
  private:
-  // Collections in collections, of which nobody has more.
-  static constexpr int kMaxNesting = 32;
+  // Collections in collections; no file in use has more.
+  static constexpr size_t kMaxNesting = 32;
 
   absl::Status Error(std::string_view message) const { return LineError(domain_.name, line_, message); }
   // `status` of the geometry, with the line.
@@ -127,7 +126,7 @@ class WktReader {
     return Next();
   }
 
-  absl::Status ReadGeometry(int nesting) {
+  absl::Status ReadGeometry() {
     const uint64_t line = line_;
     // "POINTZ" is "POINT Z".
     std::string word = absl::AsciiStrToUpper(token_);
@@ -158,7 +157,7 @@ class WktReader {
       return Expected("\"(\" or EMPTY");
     }
     if (is_collection) {
-      return ReadCollection(nesting);
+      return ReadCollection();
     }
     WELLSPACE_RETURN_IF_ERROR(type->depth == 0 ? ReadPosition() : ReadList(type->depth, type->type));
     return MoveGeometry(type->type, line);
@@ -183,14 +182,14 @@ class WktReader {
   }
 
   // Geometries between "(", which stands here, and ")".
-  absl::Status ReadCollection(int nesting) {
-    if (nesting == kMaxNesting) {
+  absl::Status ReadCollection() {
+    if (collection_.size() == kMaxNesting) {
       return Error(absl::StrCat("expected at most ", kMaxNesting, " nested collections, got more"));
     }
     collection_.push_back(0);
     do {
       WELLSPACE_RETURN_IF_ERROR(Next());
-      WELLSPACE_RETURN_IF_ERROR(ReadGeometry(nesting + 1));
+      WELLSPACE_RETURN_IF_ERROR(ReadGeometry());
       ++collection_.back();
     } while (token_ == ",");
     collection_.pop_back();

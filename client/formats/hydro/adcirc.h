@@ -16,7 +16,7 @@ namespace wellspace::formats {
 inline constexpr int32_t kAdcircMainland = 20;
 inline constexpr int32_t kAdcircIsland = 21;
 
-// What points of these formats have beside their places.
+// The data of points of these formats beside their places.
 inline constexpr char kDepth[] = "depth";          // downwards, of ADCIRC
 inline constexpr char kElevation[] = "elevation";  // upwards, of .2dm
 
@@ -37,12 +37,12 @@ struct AdcircGrid {
   uint64_t barriers = 0;  // boundaries with a second row of nodes, which is not read
 };
 
-// How far a grid is read: its nodes, whatever follows; its boundaries, whatever the elements are; all.
+// The part of a grid that is read: its nodes, whatever follows; its boundaries, whatever the elements are; all.
 enum class AdcircPart { kNodes, kBoundaries, kAll };
 
 // Reads a grid. `skips_invalid`: coordinates may be not finite.
 //
-// Memory:     for what there is, whatever the file announces.
+// Memory:     for the rows that there are, whatever the file announces.
 // Errors:     of the reader; INVALID_ARGUMENT at a line.
 absl::Status ReadAdcircGrid(LineReader& reader, AdcircPart part, bool skips_invalid, AdcircGrid& grid);
 

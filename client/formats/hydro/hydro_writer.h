@@ -1,5 +1,5 @@
 // Grids of programs for rivers and coasts: triangles whose nodes have a height each, and strings of nodes along the
-// boundary. What their writers share. Private to this folder.
+// boundary. The common part of their writers. Private to this folder.
 #ifndef WELLSPACE_CLIENT_FORMATS_HYDRO_HYDRO_WRITER_H_
 #define WELLSPACE_CLIENT_FORMATS_HYDRO_HYDRO_WRITER_H_
 
@@ -40,14 +40,14 @@ class HydroWriter : public MeshWriter {
   absl::Status Commit() final;
 
  protected:
-  // What a node's height is: the attribute `name` or, of the other sign, `opposite`; `missing` where there is none.
+  // The height of a node: the attribute `name` or, of the other sign, `opposite`; `missing` where there is none.
   struct Height {
     const char* name;
     const char* opposite;
     const char* missing;
   };
 
-  // Which edges the strings are of: `kOutside`, those with a triangle on one side alone.
+  // The edges that the strings are of: `kOutside`, those with a triangle on one side alone.
   enum class Strings { kOutside, kAny };
 
   HydroWriter(OutputFile output, const MeshShape& shape, const Height& height, Strings strings);
@@ -59,7 +59,7 @@ class HydroWriter : public MeshWriter {
 
  private:
   virtual std::string Start() = 0;
-  // A line for a node, numbered from 1 on, or a triangle; `height` and `corners` as text, these counted from 1.
+  // A line for a node, numbered from 1 on, or a triangle; `height` is text, `nodes` are counted from 0.
   virtual void AppendNode(uint64_t number, std::span<const double> point, const std::string& height,
                           std::string& line) = 0;
   virtual void AppendTriangle(uint64_t number, std::span<const uint32_t> nodes, int32_t region, std::string& line) = 0;

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <array>
 #include <limits>
-#include <map>
 #include <span>
 #include <string>
 #include <string_view>
@@ -59,10 +58,7 @@ class Reader2dm {
 
   absl::Status ReadPoints(const CloudOptions& options, PointCloud& cloud) {
     WELLSPACE_RETURN_IF_ERROR(ReadCards(/*has_elements=*/false));
-    std::vector<std::vector<double>> columns(2);
-    for (size_t i = 0; i < points_.size(); ++i) {
-      columns[i % 2].push_back(points_[i]);
-    }
+    std::vector<std::vector<double>> columns = ColumnsOf(points_, 2);
     columns.push_back(std::move(elevations_));
     return AddAllRows({"x", "y", kElevation}, columns, options, cloud);
   }
@@ -115,12 +111,9 @@ class Reader2dm {
       std::string_view field;
       fields.Next(field);
       double value = 0;
-      const CoordinateKind kind = ReadCoordinate(field, value);
-      const bool may_be_invalid = !field.empty() && kind == CoordinateKind::kInvalid && (skips_invalid_ || i == 2);
-      if (kind != CoordinateKind::kFinite && !may_be_invalid) {
-        return reader_.Error(absl::StrCat(kNames[i], " of a node: ", CoordinateError(field).message()));
+      if (absl::Status status = TakeCoordinate(field, skips_invalid_ || i == 2, value); !status.ok()) {
+        return reader_.Error(absl::StrCat(kNames[i], " of a node: ", status.message()));
       }
-      value = kind == CoordinateKind::kInvalid ? std::numeric_limits<double>::quiet_NaN() : value;
       (i < 2 ? points_ : elevations_).push_back(value);
     }
     return absl::OkStatus();

@@ -1,12 +1,11 @@
 // ADCIRC's grids as meshes and as points.
+#include <algorithm>
 #include <array>
 #include <charconv>
-#include <limits>
 #include <span>
 #include <string_view>
 #include <utility>
 
-#include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "client/formats/boundary.h"
@@ -18,7 +17,6 @@
 #include "client/formats/mesh_readers.h"
 #include "client/formats/names.h"
 #include "client/formats/point_rows.h"
-#include "client/formats/regions.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::formats {
@@ -115,14 +113,8 @@ class AdcircReader {
     std::array<double, 3> values{};
     constexpr std::array kNames = {"x", "y", "depth"};
     for (size_t i = 0; i < values.size(); ++i) {
-      const std::string_view field = Field();
-      const CoordinateKind kind = ReadCoordinate(field, values[i]);
-      const bool may_be_invalid = !field.empty() && kind == CoordinateKind::kInvalid && (skips_invalid_ || i == 2);
-      if (kind != CoordinateKind::kFinite && !may_be_invalid) {
-        return reader_.Error(absl::StrCat(kNames[i], " of a node: ", CoordinateError(field).message()));
-      }
-      if (kind == CoordinateKind::kInvalid) {
-        values[i] = std::numeric_limits<double>::quiet_NaN();
+      if (absl::Status status = TakeCoordinate(Field(), skips_invalid_ || i == 2, values[i]); !status.ok()) {
+        return reader_.Error(absl::StrCat(kNames[i], " of a node: ", status.message()));
       }
     }
     grid_.points.insert(grid_.points.end(), values.begin(), values.begin() + 2);
@@ -285,10 +277,7 @@ absl::StatusOr<Mesh> ReadAdcirc(const std::string& path) {
 absl::Status ReadAdcircPoints(LineReader& reader, const CloudOptions& options, PointCloud& cloud) {
   AdcircGrid grid;
   WELLSPACE_RETURN_IF_ERROR(ReadAdcircGrid(reader, AdcircPart::kNodes, options.skip_invalid, grid));
-  std::vector<std::vector<double>> columns(2);
-  for (size_t i = 0; i < grid.points.size(); ++i) {
-    columns[i % 2].push_back(grid.points[i]);
-  }
+  std::vector<std::vector<double>> columns = ColumnsOf(grid.points, 2);
   columns.push_back(std::move(grid.depths));
   return AddAllRows({"x", "y", kDepth}, columns, options, cloud);
 }

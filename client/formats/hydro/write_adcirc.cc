@@ -1,7 +1,6 @@
 // ADCIRC's grid, fort.14: https://adcirc.org, "ADCIRC Grid and Boundary Information File".
 #include <array>
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -22,7 +21,7 @@
 namespace wellspace::formats {
 namespace {
 
-// Where the sea goes on.
+// Whether the part of this name is an open boundary, where the sea goes on.
 bool IsOpen(const std::string& name) {
   const std::string lower = absl::AsciiStrToLower(name);
   return absl::StartsWith(lower, "open") || absl::StartsWith(lower, "ocean");

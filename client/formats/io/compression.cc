@@ -10,11 +10,7 @@
 namespace wellspace::formats {
 namespace {
 
-absl::Status Other(uint64_t size, const char* by) {
-  return absl::InvalidArgumentError(absl::StrCat("does not decompress to ", size, " bytes by ", by));
-}
-
-// What follows a length of LZ4 that is the largest of its four bits: bytes to be added, the last one below 255.
+// The bytes after a length of LZ4 that is the largest of its four bits: bytes to be added, the last one below 255.
 bool TakeLength(std::string_view bytes, size_t& at, uint64_t& length) {
   constexpr uint64_t kLongest = 15;
   uint8_t more = length == kLongest ? 255 : 0;
@@ -30,6 +26,10 @@ bool TakeLength(std::string_view bytes, size_t& at, uint64_t& length) {
 
 }  // namespace
 
+absl::Status NotCompressedBy(const char* by, uint64_t size) {
+  return absl::InvalidArgumentError(absl::StrCat("does not decompress to ", size, " bytes by ", by));
+}
+
 absl::StatusOr<std::string> InflateZlib(std::string_view compressed, uint64_t size) {
   if (size / kMaxExpansion > compressed.size()) {
     return absl::InvalidArgumentError(absl::StrCat("cannot become ", size, " bytes out of ", compressed.size()));
@@ -38,7 +38,8 @@ absl::StatusOr<std::string> InflateZlib(std::string_view compressed, uint64_t si
   uLongf produced = size;
   const int result = uncompress(reinterpret_cast<Bytef*>(bytes.data()), &produced,
                                 reinterpret_cast<const Bytef*>(compressed.data()), compressed.size());
-  return result == Z_OK && produced == size ? absl::StatusOr<std::string>(std::move(bytes)) : Other(size, "zlib");
+  return result == Z_OK && produced == size ? absl::StatusOr<std::string>(std::move(bytes))
+                                            : NotCompressedBy("zlib", size);
 }
 
 absl::StatusOr<std::string> InflateXz(std::string_view compressed, uint64_t size) {
@@ -63,7 +64,7 @@ absl::StatusOr<std::string> InflateXz(std::string_view compressed, uint64_t size
   }
   const bool is_all = result == LZMA_STREAM_END && stream.avail_in == 0 && bytes.size() == size;
   lzma_end(&stream);
-  return is_all ? absl::StatusOr<std::string>(std::move(bytes)) : Other(size, "xz");
+  return is_all ? absl::StatusOr<std::string>(std::move(bytes)) : NotCompressedBy("xz", size);
 }
 
 absl::StatusOr<std::string> InflateLz4(std::string_view compressed, uint64_t size) {
@@ -73,7 +74,7 @@ absl::StatusOr<std::string> InflateLz4(std::string_view compressed, uint64_t siz
     const auto token = static_cast<uint8_t>(compressed[at++]);
     uint64_t literals = token >> 4;
     if (!TakeLength(compressed, at, literals) || literals > compressed.size() - at || literals > size - bytes.size()) {
-      return Other(size, "LZ4");
+      return NotCompressedBy("LZ4", size);
     }
     bytes.append(compressed.substr(at, literals));
     at += literals;
@@ -81,7 +82,7 @@ absl::StatusOr<std::string> InflateLz4(std::string_view compressed, uint64_t siz
       break;  // the last sequence has literals alone
     }
     if (compressed.size() - at < 2) {
-      return Other(size, "LZ4");
+      return NotCompressedBy("LZ4", size);
     }
     const size_t distance = static_cast<uint8_t>(compressed[at]) | size_t{static_cast<uint8_t>(compressed[at + 1])}
                                                                        << 8;
@@ -89,14 +90,14 @@ absl::StatusOr<std::string> InflateLz4(std::string_view compressed, uint64_t siz
     uint64_t length = token & 15;
     if (!TakeLength(compressed, at, length) || distance == 0 || distance > bytes.size() ||
         length + kLeastMatch > size - bytes.size()) {
-      return Other(size, "LZ4");
+      return NotCompressedBy("LZ4", size);
     }
-    // Byte by byte: what is referred to may go on in what is being written.
+    // Byte by byte: the bytes referred to may go on in those being written.
     for (uint64_t i = 0; i < length + kLeastMatch; ++i) {
       bytes += bytes[bytes.size() - distance];
     }
   }
-  return bytes.size() == size ? absl::StatusOr<std::string>(std::move(bytes)) : Other(size, "LZ4");
+  return bytes.size() == size ? absl::StatusOr<std::string>(std::move(bytes)) : NotCompressedBy("LZ4", size);
 }
 
 }  // namespace wellspace::formats

@@ -1,6 +1,5 @@
 #include "client/formats/io/field_reader.h"
 
-#include <limits>
 #include <string>
 
 #include "absl/strings/str_cat.h"
@@ -40,16 +39,8 @@ absl::Status FieldReader::NextCoordinate(std::string_view what, bool may_be_inva
   }
   std::string_view field;
   WELLSPACE_RETURN_IF_ERROR(NextOf(what, field));
-  switch (ReadCoordinate(field, value)) {
-    case CoordinateKind::kFinite:
-      return absl::OkStatus();
-    case CoordinateKind::kInvalid:
-      value = std::numeric_limits<double>::quiet_NaN();
-      return absl::OkStatus();
-    case CoordinateKind::kNone:
-      break;
-  }
-  return reader_.Error(absl::StrCat(std::string(what), ": ", CoordinateError(field).message()));
+  const absl::Status status = TakeCoordinate(field, may_be_invalid, value);
+  return status.ok() ? status : reader_.Error(absl::StrCat(std::string(what), ": ", status.message()));
 }
 
 absl::Status FieldReader::NextWhole(std::string_view what, uint64_t limit, uint64_t& value) {

@@ -25,7 +25,7 @@ class FieldReader {
   //
   // Errors:     of the reader; INVALID_ARGUMENT at the line.
   absl::Status NextNumber(std::string_view what, double& value);
-  // The same; NaN for what is not finite or a word for nothing, if that `may_be_invalid`.
+  // The same; NaN for a field that is not finite or a word for nothing, if that `may_be_invalid`.
   absl::Status NextCoordinate(std::string_view what, bool may_be_invalid, double& value);
   absl::Status NextWhole(std::string_view what, uint64_t limit, uint64_t& value);
   // Drops the fields that are left of the line.

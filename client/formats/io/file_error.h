@@ -1,4 +1,4 @@
-// What the system says of a file, as a status.
+// The error of the system for a file, as a status.
 #ifndef WELLSPACE_CLIENT_FORMATS_IO_FILE_ERROR_H_
 #define WELLSPACE_CLIENT_FORMATS_IO_FILE_ERROR_H_
 

@@ -31,7 +31,7 @@ class LineReader {
 
   // The next line, valid until the next call. False at the end of the file and on an error, which status() tells apart.
   bool Next(std::string_view& line);
-  // Like Next, but skips what is blank or a comment, and cuts the comment off, and the blanks around the line. See
+  // Like Next, but skips blank lines and comments, and cuts the comment off, and the blanks around the line. See
   // CommentStart.
   bool NextContent(std::string_view& line);
   // The line that NextContent returned last, with the blanks around it.
@@ -55,11 +55,11 @@ class LineReader {
   const std::string& name() const { return file_.name(); }
   // Of the line that was returned last; the first is 1.
   uint64_t line_number() const { return line_number_; }
-  // Bytes of the file before what Next or Take would return.
+  // Bytes of the file before the line that Next or Take would return.
   uint64_t offset() const { return offset_ - (end_ - begin_); }
   // INVALID_ARGUMENT at the line that was returned last; of an empty file, at line 1.
   absl::Status Error(std::string_view message) const;
-  // What it means that Next, NextContent or Take have brought nothing, or too little: status(), or if that is ok
+  // The error where Next, NextContent or Take have brought nothing, or too little: status(), or if that is ok
   // Error(message).
   absl::Status EndError(std::string_view message) const { return status_.ok() ? Error(message) : status_; }
 

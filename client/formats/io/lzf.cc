@@ -36,7 +36,7 @@ absl::StatusOr<std::string> InflateLzf(std::string_view compressed, uint64_t siz
       if (distance > bytes.size()) {
         return error(absl::StrCat("expected a reference to one of ", bytes.size(), " bytes before, got ", distance));
       }
-      // Byte by byte: what is referred to may go on in what is being written.
+      // Byte by byte: the bytes referred to may go on in those being written.
       for (size_t i = 0; i < length + 2; ++i) {
         bytes += bytes[bytes.size() - distance];
       }

@@ -12,8 +12,8 @@ namespace wellspace::formats {
 
 // The `size` bytes that were compressed to `compressed`.
 //
-// Memory:     no more than what `compressed` can stand for, whatever `size` is.
-// Errors:     INVALID_ARGUMENT, a message without a location: they are not so many, or refer to what is not there.
+// Memory:     no more than `compressed` can stand for, whatever `size` is.
+// Errors:     INVALID_ARGUMENT, a message without a location: they are not so many, or refer beyond the bytes there.
 absl::StatusOr<std::string> InflateLzf(std::string_view compressed, uint64_t size);
 
 }  // namespace wellspace::formats

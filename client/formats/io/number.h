@@ -41,7 +41,7 @@ void AppendNumber(double value, std::string& text);
 void AppendNumber(uint64_t value, std::string& text);
 
 // Appends a text of at most `width` characters that reads back as the same bits or, if there is none, as a number as
-// near as so many characters allow; returns what it reads back as.
+// near as so many characters allow; returns the number that it reads back as.
 //
 // Guarantees: finite, also where rounding up would leave the range of double.
 // REQUIRES:   value is finite; width >= 12.
@@ -49,7 +49,7 @@ double AppendNumberWithin(double value, size_t width, std::string& text);
 
 // Splits one line into fields, without copying.
 //
-// With separator ' ' a field ends at any run of blanks and tabs; with another one, a field is what stands between two
+// With separator ' ' a field ends at any run of blanks and tabs; with another one, a field is the text between two
 // separators, without the blanks around it, and may be empty. One pair of double quotes around it is dropped; between
 // the quotes, separators are characters like others. A tab as separator is no blank.
 class FieldSplitter {

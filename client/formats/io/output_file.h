@@ -38,7 +38,7 @@ class OutputFile {
   bool IsSeekable() const { return !temporary_.empty(); }
   // The name that the file has until Commit, for a library that writes it; empty unless IsSeekable().
   const std::string& temporary_path() const { return temporary_; }
-  // Sends what is buffered to the system. Returns the first error so far.
+  // Sends the buffer to the system. Returns the first error so far.
   absl::Status Flush();
   // Flushes and gives the file its name.
   absl::Status Commit();

@@ -1,4 +1,4 @@
-// What reader and writer of Gmsh's MSH share. Private to client/formats.
+// The common part of reader and writer of Gmsh's MSH. Private to client/formats.
 #ifndef WELLSPACE_CLIENT_FORMATS_MSH_MSH_H_
 #define WELLSPACE_CLIENT_FORMATS_MSH_MSH_H_
 

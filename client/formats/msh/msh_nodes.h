@@ -40,7 +40,7 @@ class MshNodes {
     return absl::OkStatus();
   }
 
-  // Makes nodes be found, once all are read. Those that are numbered from 1 on, in order, need no table.
+  // Makes nodes be found, once all are read. Nodes that are numbered from 1 on, in order, need no table.
   //
   // Complexity: O(nodes), and a sort where they are in another order.
   // Errors:     INVALID_ARGUMENT for two nodes of one number, or too many.

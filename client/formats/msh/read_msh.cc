@@ -41,8 +41,8 @@ int NodesOf(uint64_t type) {
   }
 }
 
-// Reads section after section. Rows of the versions differ in their order alone; what numbers look like is MshNumbers'
-// to know.
+// Reads section after section. Rows of the versions differ in their order alone; MshNumbers knows the encoding of
+// numbers.
 class MshReader {
  public:
   MshReader(LineReader& reader, const std::string& numbers)
@@ -60,7 +60,7 @@ class MshReader {
     return MakeMesh();
   }
 
-  // The nodes alone, whatever the elements are. What follows them is not looked at.
+  // The nodes alone, whatever the elements are. Later sections are not looked at.
   absl::Status ReadPoints(const CloudOptions& options, PointCloud& cloud) {
     if (options.skip_invalid) {
       nodes_.AllowInvalid();
@@ -161,7 +161,7 @@ class MshReader {
     return absl::OkStatus();
   }
 
-  // Of points, curves, surfaces and volumes: numbers, bounding boxes, groups, and what bounds them.
+  // Of points, curves, surfaces and volumes: numbers, bounding boxes, groups, and their bounds.
   absl::Status ReadEntities() {
     std::array<uint64_t, 4> counts{};
     for (uint64_t& count : counts) {
@@ -221,7 +221,7 @@ class MshReader {
     return status;
   }
 
-  // The dimension and number of an entity, what the section has third, and the rows of the block.
+  // Reads the head of a block: the dimension and number of an entity, the section's third number, and the rows.
   absl::Status ReadBlock(const char* third_name, uint64_t& dimension, uint64_t& entity, uint64_t& third,
                          uint64_t& rows) {
     absl::Status status = file_.Int("the dimension of an entity", 3, dimension);

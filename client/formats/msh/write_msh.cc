@@ -4,7 +4,6 @@
 #include <limits>
 #include <map>
 #include <memory>
-#include <set>
 #include <span>
 #include <string>
 #include <utility>
@@ -16,75 +15,15 @@
 #include "client/formats/io/output_file.h"
 #include "client/formats/mesh_writers.h"
 #include "client/formats/msh/msh.h"
-#include "client/formats/names.h"
+#include "client/formats/msh/msh_groups.h"
 #include "client/formats/regions.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
 
-template <typename T>
-void AppendBytes(T value, std::string& bytes) {
-  bytes.append(reinterpret_cast<const char*>(&value), sizeof(T));
-}
-
-// The regions that groups are made of: there is one even if nothing is told of regions.
-std::vector<Region> RegionsOf(const MeshShape& shape) {
-  return shape.regions.empty() ? std::vector<Region>{{.id = 1, .name = "domain"}} : shape.regions;
-}
-
-// A name as Gmsh reads it: from its quote to the next one, on a line of which it takes 127 bytes.
-constexpr size_t kMaxMshNameBytes = 112;
-std::string MshName(std::string_view name, NameChanges& changes) {
-  std::string written(CutName(name, kMaxMshNameBytes));
-  for (char& c : written) {
-    if (static_cast<unsigned char>(c) < ' ' || c == '\x7f' || c == '"') {
-      c = '_';
-    }
-  }
-  changes.Add(name, written);
-  return written;
-}
-
-// The numbers of entities that have these groups: those of the groups where these are positive, others are free ones.
-std::map<int32_t, int32_t> Entities(std::span<const int32_t> groups) {
-  std::set<int32_t> taken(groups.begin(), groups.end());
-  std::map<int32_t, int32_t> entities;
-  int32_t free = 1;
-  for (const int32_t group : groups) {
-    if (group > 0) {
-      entities[group] = group;
-      continue;
-    }
-    while (!taken.insert(free).second) {
-      ++free;
-    }
-    entities[group] = free;
-  }
-  return entities;
-}
-
-std::vector<int32_t> NumbersOf(std::span<const BoundaryPart> parts) {
-  std::vector<int32_t> numbers;
-  for (const BoundaryPart& part : parts) {
-    numbers.push_back(part.tag);
-  }
-  return numbers;
-}
-
-std::vector<int32_t> NumbersOf(std::span<const Region> regions) {
-  std::vector<int32_t> numbers;
-  for (const Region& region : regions) {
-    numbers.push_back(region.id);
-  }
-  return numbers;
-}
-
-// Whether a region is a group: simplices of the region 0 are of none if it has no name.
-bool IsGroup(const Region& region) { return region.id != 0 || !region.name.empty(); }
-
-// What both versions share: the order of the sections, and rows put together before they are written. What the versions
-// do differently is called in this order: WriteNodesHeader; AppendNode for each vertex; ElementsHeader and
+// The common part of both versions: the order of the sections, and rows put together before they are written. The
+// functions of a version are called in this order: WriteNodesHeader; AppendNode for each vertex; ElementsHeader and
 // BeginSimplices; WriteSimplex for each simplex; EndSimplices; for each part of the boundary AppendBlock, then
 // AppendFacet for each facet; AppendData for each vertex, once for each array of numbers.
 class MshWriter : public MeshWriter {
@@ -107,7 +46,7 @@ class MshWriter : public MeshWriter {
 
   absl::Status AddSimplexRegions(std::span<const int32_t> regions) final {
     for (const int32_t region : regions) {
-      if (!entities_.contains(region)) {
+      if (!groups_.entities().contains(region)) {
         return absl::InternalError(absl::StrCat("a mesh got a simplex of region ", region, ", and has no such region"));
       }
     }
@@ -120,7 +59,7 @@ class MshWriter : public MeshWriter {
     const size_t corners = shape_.dimension + 1;
     WELLSPACE_RETURN_IF_ERROR(regions_.CheckNext(shape_.has_simplex_regions ? simplices.size() / corners : 0));
     for (; !simplices.empty() && output_.status().ok(); simplices = simplices.subspan(corners)) {
-      const int32_t group = shape_.has_simplex_regions ? regions_.Next() : OnlyRegion();
+      const int32_t group = shape_.has_simplex_regions ? regions_.Next() : groups_.first();
       row_.clear();
       WriteSimplex(simplices.first(corners), group, ++simplices_, row_);
     }
@@ -156,10 +95,9 @@ class MshWriter : public MeshWriter {
     if (shape_.has_weights) {
       WriteNodeData(kMshWeights, [this](uint64_t vertex) { return weights_[vertex]; });
     }
-    if (entities_.begin()->first < 0 || (!part_entities_.empty() && part_entities_.begin()->first < 0)) {
-      AddNote("Gmsh takes the sign of a group's number for a direction, and shows -7 as 7");
+    for (std::string& note : groups_.Notes()) {
+      AddNote(std::move(note));
     }
-    AddNote(changes_.Note(absl::StrCat("Gmsh reads names of at most ", kMaxMshNameBytes, " bytes, without quotes")));
     return output_.Commit();
   }
 
@@ -171,39 +109,9 @@ class MshWriter : public MeshWriter {
   int facet_type() const { return shape_.dimension == 2 ? kMshLine : kMshTriangle; }
   uint64_t element_count() const { return shape_.simplex_count + shape_.facet_count(); }
 
-  // Whether groups have names, and entities are described.
-  bool has_groups() const { return !shape_.boundary.empty() || !shape_.regions.empty(); }
-  // The region of simplices that are all of one.
-  int32_t OnlyRegion() const { return groups_.front().id; }
-
-  // The section with the names of groups, if there are any. Gmsh counts groups by their dimensions: a part of the
-  // boundary and a region may have the same number. Parts stand first, for gmshToFoam, which does not count so and
-  // takes the first name of a number.
-  std::string PhysicalNames() {
-    if (!has_groups()) {
-      return "";
-    }
-    std::string rows;
-    uint64_t count = shape_.boundary.size();
-    for (const BoundaryPart& part : shape_.boundary) {
-      absl::StrAppend(&rows, shape_.dimension - 1, " ", part.tag, " \"", MshName(part.name, changes_), "\"\n");
-    }
-    for (const Region& region : groups_) {
-      if (IsGroup(region)) {
-        ++count;
-        absl::StrAppend(&rows, shape_.dimension, " ", region.id, " \"", MshName(region.name, changes_), "\"\n");
-      }
-    }
-    return absl::StrCat("$PhysicalNames\n", count, "\n", rows, "$EndPhysicalNames\n");
-  }
-
   const MeshShape shape_;
-  const std::vector<Region> groups_ = RegionsOf(shape_);  // physical groups of simplices, and 0 for none
-  // Of the regions and of the parts of the boundary, by their numbers.
-  const std::map<int32_t, int32_t> entities_ = Entities(NumbersOf(std::span<const Region>(groups_)));
-  const std::map<int32_t, int32_t> part_entities_ = Entities(NumbersOf(std::span<const BoundaryPart>(shape_.boundary)));
+  MshGroups groups_{shape_};
   RegionQueue regions_;
-  NameChanges changes_;
   OutputFile output_;
 
  private:
@@ -217,7 +125,7 @@ class MshWriter : public MeshWriter {
   virtual void WriteSimplex(std::span<const uint32_t> corners, int32_t group, uint64_t number, std::string& row) = 0;
   // All simplices have come; may be called again.
   virtual void EndSimplices() {}
-  // What goes before the facets of a part.
+  // The lines before the facets of a part.
   virtual void AppendBlock(const BoundaryPart& /*part*/, std::string& /*row*/) const {}
   virtual void AppendFacet(std::span<const uint32_t> corners, int32_t tag, uint64_t number, std::string& row) const = 0;
   virtual void AppendData(uint64_t node, double value, std::string& row) const = 0;
@@ -272,8 +180,8 @@ class Msh22Writer final : public MshWriter {
 
  private:
   void WriteNodesHeader() override {
-    output_.Write(
-        absl::StrCat("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n", PhysicalNames(), "$Nodes\n", shape_.vertex_count, "\n"));
+    output_.Write(absl::StrCat("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n", groups_.PhysicalNames(), "$Nodes\n",
+                               shape_.vertex_count, "\n"));
   }
 
   void AppendNode(std::span<const double> point, uint64_t number, std::string& row) const override {
@@ -288,12 +196,12 @@ class Msh22Writer final : public MshWriter {
   std::string ElementsHeader() const override { return absl::StrCat("$Elements\n", element_count(), "\n"); }
 
   void WriteSimplex(std::span<const uint32_t> corners, int32_t group, uint64_t number, std::string& row) override {
-    AppendRow(type(), corners, group, entities_.at(group), number, row);
+    AppendRow(type(), corners, group, groups_.entities().at(group), number, row);
     output_.Write(row);
   }
 
   void AppendFacet(std::span<const uint32_t> corners, int32_t tag, uint64_t number, std::string& row) const override {
-    AppendRow(facet_type(), corners, tag, part_entities_.at(tag), number, row);
+    AppendRow(facet_type(), corners, tag, groups_.part_entities().at(tag), number, row);
   }
 
   // Two tags: the physical group and the geometric entity.
@@ -325,8 +233,8 @@ class Msh41Writer final : public MshWriter {
   void WriteNodesHeader() override {
     std::string text = "$MeshFormat\n4.1 1 8\n";
     AppendBytes<int32_t>(1, text);
-    absl::StrAppend(&text, "\n$EndMeshFormat\n", PhysicalNames());
-    AppendEntities(text);
+    absl::StrAppend(&text, "\n$EndMeshFormat\n", groups_.PhysicalNames());
+    groups_.AppendEntities(text);
     text += "$Nodes\n";
     AppendCounts(shape_.vertex_count > 0 ? 1 : 0, shape_.vertex_count, text);
     if (shape_.vertex_count > 0) {
@@ -369,7 +277,7 @@ class Msh41Writer final : public MshWriter {
     uint64_t number = 1;
     for (const auto& [region, simplices] : regions_.Sizes()) {
       RegionBlock& block = blocks_[region];
-      for (const int32_t value : {static_cast<int32_t>(shape_.dimension), entities_.at(region), type()}) {
+      for (const int32_t value : {static_cast<int32_t>(shape_.dimension), groups_.entities().at(region), type()}) {
         AppendBytes(value, block.header);
       }
       AppendBytes(simplices, block.header);
@@ -429,7 +337,7 @@ class Msh41Writer final : public MshWriter {
 
   void AppendBlock(const BoundaryPart& part, std::string& row) const override {
     for (const int32_t value :
-         {static_cast<int32_t>(shape_.dimension - 1), part_entities_.at(part.tag), facet_type()}) {
+         {static_cast<int32_t>(shape_.dimension - 1), groups_.part_entities().at(part.tag), facet_type()}) {
       AppendBytes(value, row);
     }
     AppendBytes<uint64_t>(part.facets, row);
@@ -439,50 +347,10 @@ class Msh41Writer final : public MshWriter {
     AppendElement(corners, number, row);
   }
 
-  // Points, curves, surfaces, volumes: of each its number, its bounding box, its groups, and what bounds it. Every part
-  // of the boundary is an entity with its number; the bounding box of all is that of the mesh.
-  void AppendEntities(std::string& text) const {
-    if (!has_groups()) {
-      return;
-    }
-    text += "$Entities\n";
-    for (int dimension = 0; dimension <= 3; ++dimension) {
-      AppendBytes<uint64_t>(dimension == shape_.dimension       ? groups_.size()
-                            : dimension == shape_.dimension - 1 ? shape_.boundary.size()
-                                                                : 0,
-                            text);
-    }
-    for (const BoundaryPart& part : shape_.boundary) {
-      AppendEntity(part_entities_.at(part.tag), part.tag, text);
-      AppendBytes<uint64_t>(0, text);
-    }
-    for (const Region& region : groups_) {
-      AppendEntity(entities_.at(region.id), IsGroup(region) ? region.id : 0, text);
-      // All parts bound the only region. Which of them bound one of several is not known.
-      AppendBytes<uint64_t>(shape_.has_simplex_regions ? 0 : shape_.boundary.size(), text);
-      for (size_t i = 0; i < shape_.boundary.size() && !shape_.has_simplex_regions; ++i) {
-        AppendBytes(part_entities_.at(shape_.boundary[i].tag), text);
-      }
-    }
-    text += "\n$EndEntities\n";
-  }
-
-  void AppendEntity(int32_t number, int32_t group, std::string& text) const {
-    AppendBytes(number, text);
-    for (const std::vector<double>* corner : {&shape_.low, &shape_.high}) {
-      for (size_t axis = 0; axis < 3; ++axis) {
-        AppendBytes(axis < corner->size() ? (*corner)[axis] : 0.0, text);
-      }
-    }
-    AppendBytes<uint64_t>(group == 0 ? 0 : 1, text);
-    if (group != 0) {
-      AppendBytes(group, text);
-    }
-  }
-
-  // The dimension and number of the entity of nodes and of a mesh of one region; then what the section has third.
+  // The dimension and number of the entity of nodes and of a mesh of one region; then the section's third number.
   void AppendBlockOf(int32_t third, std::string& text) const {
-    for (const int32_t value : {static_cast<int32_t>(shape_.dimension), entities_.at(OnlyRegion()), third}) {
+    for (const int32_t value :
+         {static_cast<int32_t>(shape_.dimension), groups_.entities().at(groups_.first()), third}) {
       AppendBytes(value, text);
     }
   }
@@ -490,7 +358,7 @@ class Msh41Writer final : public MshWriter {
   // The simplices of a region.
   struct RegionBlock {
     std::string header;
-    std::string rows;  // those that are not in the file yet; at most kBlockBytes and a row if it can be sought
+    std::string rows;  // rows that are not in the file yet; at most kBlockBytes and a row if it can be sought
     uint64_t next_number = 0;
     uint64_t place = 0;  // of the next row, if the file can be sought
   };

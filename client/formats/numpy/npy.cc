@@ -252,7 +252,7 @@ absl::Status NpyReader::ReadWords(std::vector<Value>& values, Convert convert) {
   return ExpectEnd();
 }
 
-// Calls `read` with a value of the type that `type` names, and returns what it returns; nothing for other types.
+// Calls `read` with a value of the type that `type` names, and returns its result; nothing for other types.
 template <typename Read>
 std::optional<absl::Status> NpyReader::ForWholeType(const Read& read) {
   const std::string_view type = header_.type;

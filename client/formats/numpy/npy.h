@@ -38,7 +38,7 @@ struct NpyHeader {
 // Errors:     INVALID_ARGUMENT, a message without a location.
 absl::StatusOr<NpyHeader> ParseNpyHeader(std::string_view text);
 
-// What stands before the values of an array in C order, in version 1.0, padded as numpy does; without columns it has
+// The header before the values of an array in C order, in version 1.0, padded as numpy does; without columns it has
 // one dimension.
 std::string NpyPreamble(const std::string& type, uint64_t rows, std::optional<uint64_t> columns);
 
@@ -48,10 +48,10 @@ std::string NpyPreamble(const std::string& type, uint64_t rows, std::optional<ui
 class NpyReader {
  public:
   // Reads magic and header. `name` is that of the array, for messages. The source has `size` bytes, if that is known:
-  // what the header says is not believed beyond it.
+  // counts of the header are not believed beyond it.
   //
   // REQUIRES:   dimensions is 1 or 2.
-  // Errors:     of the source; INVALID_ARGUMENT "NAME: …" for what is not an array of so many dimensions.
+  // Errors:     of the source; INVALID_ARGUMENT "NAME: …" for anything but an array of so many dimensions.
   static absl::StatusOr<NpyReader> Open(std::string name, ByteSource source, std::optional<uint64_t> size,
                                         size_t dimensions = 2);
 

@@ -20,7 +20,7 @@ class NpyRows {
   // Reads the header of the array of points in `path`.
   //
   // Errors:     of opening and reading; INVALID_ARGUMENT "FILE: …" unless it is a regular file with one array in C
-  //             order, of 2 to 6 columns of type Float64 or Float32. What is an array otherwise may still be read by
+  //             order, of 2 to 6 columns of type Float64 or Float32. Other arrays may still be read by
   //             ReadCloud, as a whole.
   static absl::StatusOr<NpyRows> Open(const std::string& path);
 

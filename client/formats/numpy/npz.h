@@ -18,6 +18,18 @@ inline constexpr char kNpzFacetTags[] = "facet_tags.npy";           // facet_cou
 inline constexpr char kNpzFacetNames[] = "facet_names.npy";         // of the parts of the boundary, in UTF-32
 inline constexpr char kNpzFacetNameTags[] = "facet_name_tags.npy";  // the tag of each name
 
+// Only of meshes with creases, in 3-D.
+inline constexpr char kNpzRidges[] = "ridges.npy";  // ridge_count x 2, indices of points
+
+// Only of a part of a larger mesh.
+inline constexpr char kNpzPart[] = "part.npy";             // part, parts, own vertices, own simplices
+inline constexpr char kNpzVertexIds[] = "vertex_ids.npy";  // vertex_count; so the next two
+inline constexpr char kNpzVertexOwners[] = "vertex_owners.npy";
+inline constexpr char kNpzVertexRows[] = "vertex_rows.npy";
+inline constexpr char kNpzSimplexIds[] = "simplex_ids.npy";        // simplex_count
+inline constexpr char kNpzSimplexOwners[] = "simplex_owners.npy";  // simplex_count
+inline constexpr char kNpzFacetIds[] = "facet_ids.npy";            // facet_count
+
 // Only where regions are known.
 inline constexpr char kNpzRegionIds[] = "region_ids.npy";      // a row for each region
 inline constexpr char kNpzRegionNames[] = "region_names.npy";  // of these, in UTF-32

@@ -17,7 +17,7 @@
 namespace wellspace::formats {
 namespace {
 
-// Which columns of the array are coordinates.
+// The columns of the array that are coordinates.
 absl::StatusOr<std::vector<size_t>> ChooseColumns(const NpyReader& array, const CloudOptions& options,
                                                   const std::string& name) {
   const uint64_t count = array.columns();

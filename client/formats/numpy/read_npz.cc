@@ -105,6 +105,16 @@ absl::Status ReadBoundary(ZipReader& archive, const std::string& file, Mesh& mes
   return absl::OkStatus();
 }
 
+absl::Status ReadRidges(ZipReader& archive, const std::string& file, Mesh& mesh) {
+  WELLSPACE_ASSIGN_OR_RETURN(NpyReader ridges, OpenArray(archive, file, kNpzRidges));
+  if (mesh.dimension != 3 || ridges.columns() != 2) {
+    return absl::InvalidArgumentError(absl::StrCat(file, ": ", kNpzRidges,
+                                                   ": expected 2 columns, of points in 3-D, got ", ridges.columns(),
+                                                   " in ", mesh.dimension, "-D"));
+  }
+  return ridges.ReadIndices(mesh.View().vertex_count(), mesh.ridges);
+}
+
 absl::Status ReadRegions(ZipReader& archive, const std::string& file, Mesh& mesh) {
   std::vector<int32_t> ids;
   WELLSPACE_RETURN_IF_ERROR(ReadTags(archive, file, kNpzRegions, ids));
@@ -171,6 +181,9 @@ absl::StatusOr<Mesh> ReadNpz(const std::string& path, const std::string& numbers
   }
   if (archive->Has(kNpzFacets)) {
     WELLSPACE_RETURN_IF_ERROR(ReadBoundary(*archive, name, mesh));
+  }
+  if (archive->Has(kNpzRidges)) {
+    WELLSPACE_RETURN_IF_ERROR(ReadRidges(*archive, name, mesh));
   }
   return mesh;
 }

@@ -1,5 +1,6 @@
 // numpy's .npz: a mesh as arrays.
 #include <algorithm>
+#include <array>
 #include <optional>
 #include <span>
 #include <string>
@@ -92,6 +93,15 @@ class NpzWriter final : public MeshWriter {
     return archive_.status();
   }
 
+  absl::Status AddRidges(std::span<const uint32_t> ridges) override {
+    if (!std::exchange(has_ridges_, true)) {
+      Begin(kNpzRidges, "<u4", shape_.ridge_count, 2, sizeof(uint32_t));
+    }
+    Write(ridges);
+    ridges_ += ridges.size() / 2;
+    return archive_.status();
+  }
+
   absl::Status Commit() override {
     BeginSimplices();
     if (!shape_.boundary.empty()) {
@@ -101,6 +111,9 @@ class NpzWriter final : public MeshWriter {
     if (!shape_.regions.empty()) {
       WriteRegions();
     }
+    if (shape_.part != nullptr) {
+      WritePart(*shape_.part);
+    }
     AddNote(changes_.Note(absl::StrCat("names are text of at most ", kMaxNpyCharacters, " characters")));
     WELLSPACE_RETURN_IF_ERROR(archive_.Finish());
     WELLSPACE_RETURN_IF_ERROR(CheckComplete(shape_, {.vertices = vertices_,
@@ -108,7 +121,8 @@ class NpzWriter final : public MeshWriter {
                                                      .simplex_regions = simplex_regions_,
                                                      .simplices = simplices_,
                                                      .facets = facets_,
-                                                     .attribute_values = attribute_values_}));
+                                                     .attribute_values = attribute_values_,
+                                                     .ridges = ridges_}));
     return output_.Commit();
   }
 
@@ -137,7 +151,7 @@ class NpzWriter final : public MeshWriter {
     }
   }
 
-  // What is known of facets beside the indices.
+  // The data of facets beside the indices.
   void WriteTags() {
     std::vector<int32_t> tags;
     std::vector<std::string> names;
@@ -165,6 +179,21 @@ class NpzWriter final : public MeshWriter {
     }
     WriteNumbers(kNpzRegionIds, ids);
     WriteNames(kNpzRegionNames, names);
+  }
+
+  void WritePart(const PartNumbers& part) {
+    const std::array<uint64_t, 4> numbers = {part.part, part.parts, part.own_vertices, part.own_simplices};
+    Begin(kNpzPart, "<u8", numbers.size(), std::nullopt, sizeof(uint64_t));
+    Write(std::span<const uint64_t>(numbers));
+    for (const auto& [member, values] : {std::pair(kNpzVertexIds, part.vertex_ids),
+                                         {kNpzVertexOwners, part.vertex_owners},
+                                         {kNpzVertexRows, part.vertex_rows},
+                                         {kNpzSimplexIds, part.simplex_ids},
+                                         {kNpzSimplexOwners, part.simplex_owners},
+                                         {kNpzFacetIds, part.facet_ids}}) {
+      Begin(member, "<u4", values.size(), std::nullopt, sizeof(uint32_t));
+      Write(values);
+    }
   }
 
   void WriteNumbers(const char* member, std::span<const int32_t> numbers) {
@@ -213,10 +242,12 @@ class NpzWriter final : public MeshWriter {
   bool has_vertex_tags_ = false;
   bool has_simplex_regions_ = false;
   bool has_facets_ = false;
+  bool has_ridges_ = false;
   size_t attributes_begun_ = 0;  // members
   uint64_t simplex_regions_ = 0;
   NameChanges changes_;
   uint64_t facets_ = 0;
+  uint64_t ridges_ = 0;
   uint64_t attribute_values_ = 0;
 };
 

@@ -17,7 +17,7 @@
 namespace wellspace::formats {
 namespace {
 
-// Members of this size or more, compressed or not, want the fields of zip64. Deflate lengthens what it cannot compress
+// Members of this size or more, compressed or not, want the fields of zip64. Deflate lengthens data it cannot compress
 // by far less than the difference to 2^32.
 constexpr uint64_t kZip64Bytes = 0xff00'0000;
 
@@ -26,7 +26,7 @@ constexpr uLong kEncrypted = 1;  // flag
 // For unzLocateFile.
 constexpr int kCaseSensitive = 1;
 
-// Turns what minizip gives for an end of a seek into a position. False when it lies outside the file.
+// Turns minizip's origin of a seek into a position. False when it lies outside the file.
 bool Seek(ZPOS64_T offset, int origin, uint64_t size, uint64_t& position) {
   const uint64_t base = origin == ZLIB_FILEFUNC_SEEK_SET ? 0 : origin == ZLIB_FILEFUNC_SEEK_CUR ? position : size;
   if (offset > size - std::min(base, size)) {
@@ -148,7 +148,7 @@ struct ZipReader::Archive {
 
   static Archive& Of(voidpf opaque) { return *static_cast<Archive*>(opaque); }
 
-  // What was read last from the file: minizip asks for headers byte by byte.
+  // The bytes read last from the file: minizip asks for headers byte by byte.
   std::vector<char> block;
   uint64_t block_begin = 0;
 

@@ -50,7 +50,7 @@ class ZipWriter {
 // Thread safety: thread-compatible.
 class ZipReader {
  public:
-  // Errors:     INVALID_ARGUMENT "FILE: …" for what is no archive, or no regular file.
+  // Errors:     INVALID_ARGUMENT "FILE: …" for a file that is no archive, or no regular file.
   static absl::StatusOr<std::unique_ptr<ZipReader>> Open(InputFile file);
   ~ZipReader();
   ZipReader(const ZipReader&) = delete;

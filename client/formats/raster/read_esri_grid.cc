@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -35,14 +34,13 @@ class EsriGridReader {
     const uint64_t count = frame.columns * frame.rows;
     while (!field.empty()) {
       double value = 0;
-      if (ReadCoordinate(field, value) == CoordinateKind::kNone) {
+      if (!ReadOrNan(field, value)) {
         return reader_.Error(absl::StrCat("a cell: ", CoordinateError(field).message()));
       }
-      const bool is_finite = ReadCoordinate(field, value) == CoordinateKind::kFinite;
       if (cells.count() == count) {
         return reader_.Error(absl::StrCat("expected ", count, " cells, as the header says, got more"));
       }
-      cells.Add(is_finite ? value : std::numeric_limits<double>::quiet_NaN());
+      cells.Add(value);
       field = fields_.Next(field) ? field : std::string_view();
     }
     if (!reader_.status().ok() || cells.count() < count) {
@@ -107,7 +105,7 @@ class EsriGridReader {
     WELLSPACE_ASSIGN_OR_RETURN(frame.x, Either("xllcorner", "xllcenter", is_corner));
     frame.x += is_corner ? frame.width / 2 : 0;
     WELLSPACE_ASSIGN_OR_RETURN(frame.y, Either("yllcorner", "yllcenter", is_corner));
-    // What the header has is the lower left cell.
+    // The header names the lower left cell.
     frame.y += (is_corner ? frame.height / 2 : 0) + static_cast<double>(frame.rows - 1) * frame.height;
     return frame;
   }

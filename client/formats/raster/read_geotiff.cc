@@ -1,6 +1,5 @@
 // GeoTIFF, OGC 19-008r4, of one band: its first image.
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <map>

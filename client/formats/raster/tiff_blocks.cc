@@ -15,10 +15,6 @@ enum TiffCompression : uint64_t { kNone = 1, kLzw = 5, kDeflate = 8, kOldDeflate
 enum TiffPredictor : uint64_t { kNoPredictor = 1, kDifferences = 2, kFloatDifferences = 3 };
 enum TiffFormat : uint64_t { kUnsigned = 1, kSigned = 2, kFloat = 3 };
 
-absl::Status WrongBlock(uint64_t size, const char* by) {
-  return absl::InvalidArgumentError(absl::StrCat("does not decompress to ", size, " bytes by ", by));
-}
-
 absl::StatusOr<std::string> Decompress(std::string_view block, uint64_t size, uint64_t compression) {
   switch (compression) {
     case kLzw:
@@ -176,7 +172,7 @@ absl::StatusOr<std::string> InflateTiffLzw(std::string_view compressed, uint64_t
       count += 8;
     }
     if (count < width) {
-      return WrongBlock(size, "LZW");
+      return NotCompressedBy("LZW", size);
     }
     count -= width;
     const uint32_t code = bits >> count & ((1u << width) - 1);
@@ -186,10 +182,10 @@ absl::StatusOr<std::string> InflateTiffLzw(std::string_view compressed, uint64_t
     if (code == LzwStrings::kClear) {
       strings.Clear();
     } else if (!strings.Append(code, size, bytes)) {
-      return WrongBlock(size, "LZW");
+      return NotCompressedBy("LZW", size);
     }
   }
-  return bytes.size() == size ? absl::StatusOr<std::string>(std::move(bytes)) : WrongBlock(size, "LZW");
+  return bytes.size() == size ? absl::StatusOr<std::string>(std::move(bytes)) : NotCompressedBy("LZW", size);
 }
 
 absl::StatusOr<std::string> InflatePackBits(std::string_view compressed, uint64_t size) {
@@ -201,12 +197,12 @@ absl::StatusOr<std::string> InflatePackBits(std::string_view compressed, uint64_
                                            : uint64_t{1} + static_cast<uint64_t>(-code);
     const size_t taken = code >= 0 ? length : code == -128 ? 0 : 1;
     if (taken > compressed.size() - at || length > size - bytes.size()) {
-      return WrongBlock(size, "PackBits");
+      return NotCompressedBy("PackBits", size);
     }
     code >= 0 ? bytes.append(compressed.substr(at, length)) : bytes.append(length, taken == 0 ? '\0' : compressed[at]);
     at += taken;
   }
-  return bytes.size() == size ? absl::StatusOr<std::string>(std::move(bytes)) : WrongBlock(size, "PackBits");
+  return bytes.size() == size ? absl::StatusOr<std::string>(std::move(bytes)) : NotCompressedBy("PackBits", size);
 }
 
 absl::StatusOr<std::vector<double>> TiffSamples(std::string_view block, uint64_t rows, uint64_t columns,

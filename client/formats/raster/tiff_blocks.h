@@ -13,7 +13,7 @@
 
 namespace wellspace::formats {
 
-// How samples are stored, by the numbers of the tags.
+// The layout of samples, by the numbers of the tags.
 struct TiffLayout {
   bool big_endian = false;
   uint64_t bits = 8;         // of a sample
@@ -28,7 +28,7 @@ absl::Status CheckLayout(const TiffLayout& layout);
 // The samples of a block of `rows` times `columns`.
 //
 // REQUIRES:   CheckLayout.
-// Memory:     no more than what `block` can stand for.
+// Memory:     no more than `block` can stand for.
 // Errors:     INVALID_ARGUMENT, a message without a location.
 absl::StatusOr<std::vector<double>> TiffSamples(std::string_view block, uint64_t rows, uint64_t columns,
                                                 const TiffLayout& layout);

@@ -1,18 +1,16 @@
 // TetGen's .smesh and 3-D .poly.
-#include <algorithm>
 #include <array>
 #include <string>
-#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "client/formats/coordinate.h"
 #include "client/formats/io/line_reader.h"
 #include "client/formats/io/number.h"
 #include "client/formats/surface/surface_builder.h"
 #include "client/formats/surface/surface_readers.h"
 #include "client/formats/tetgen/poly_points.h"
+#include "client/formats/tetgen/poly_seeds.h"
 #include "client/formats/tetgen/tetgen_lines.h"
 #include "core/base/status_macros.h"
 
@@ -26,15 +24,12 @@ class FacetReader {
 
   absl::Status Read() {
     WELLSPACE_RETURN_IF_ERROR(ReadPoints());
-    for (auto read : {&FacetReader::ReadFacets, &FacetReader::ReadHoles, &FacetReader::ReadRegions}) {
-      std::string_view line;
-      if (!reader_.NextContent(line)) {
-        return reader_.Finish();  // every later part may be missing
-      }
-      WELLSPACE_RETURN_IF_ERROR((this->*read)(line));
+    std::string_view line;
+    if (!reader_.NextContent(line)) {
+      return reader_.Finish();  // every later part may be missing
     }
-    WELLSPACE_RETURN_IF_ERROR(ExpectEnd(reader_, regions_, "regions"));
-    return reader_.Finish();
+    WELLSPACE_RETURN_IF_ERROR(ReadFacets(line));
+    return ReadSeeds();
   }
 
  private:
@@ -102,8 +97,9 @@ class FacetReader {
         return reader_.Error(absl::StrCat("marker: ", status.message()));
       }
     }
-    return ExpectNoMore(fields, has_marker ? "the numbers of polygons and holes and a marker"
-                                           : "the numbers of polygons and holes, and no marker, as the header says");
+    return ExpectNoMore(reader_, fields,
+                        has_marker ? "the numbers of polygons and holes and a marker"
+                                   : "the numbers of polygons and holes, and no marker, as the header says");
   }
 
   // "corners corner … [marker]"
@@ -133,57 +129,22 @@ class FacetReader {
         return reader_.Error(absl::StrCat("marker: ", status.message()));
       }
     }
-    return ExpectNoMore(fields, absl::StrCat(count, has_marker ? " corners and a marker" : " corners, and no marker"));
+    return ExpectNoMore(reader_, fields,
+                        absl::StrCat(count, has_marker ? " corners and a marker" : " corners, and no marker"));
   }
 
-  absl::Status ReadHoles(std::string_view line) {
-    std::array<uint64_t, 1> count{};
-    constexpr std::array kNames = {"number of holes"};
-    WELLSPACE_RETURN_IF_ERROR(ReadHeader(reader_, line, 1, kNames, count));
-    uint64_t base = 0;
-    for (uint64_t hole = 0; hole < count[0]; ++hole) {
-      if (!reader_.NextContent(line)) {
-        return CountError(reader_, count[0], "holes", hole);
-      }
-      FieldSplitter fields(line, ' ');
-      WELLSPACE_RETURN_IF_ERROR(ReadIndex(reader_, fields, hole, base));
-      Surface::Seed seed = {.is_hole = true};
-      WELLSPACE_RETURN_IF_ERROR(ReadPlace(fields, seed));
-      WELLSPACE_RETURN_IF_ERROR(ExpectNoMore(fields, "an index, x, y and z of a hole"));
-      AddSeed(seed);
-    }
-    return absl::OkStatus();
-  }
-
-  absl::Status ReadRegions(std::string_view line) {
-    constexpr std::array kNames = {"number of regions"};
-    WELLSPACE_RETURN_IF_ERROR(ReadHeader(reader_, line, 1, kNames, {&regions_, 1}));
-    uint64_t base = 0;
+  absl::Status ReadSeeds() {
     uint64_t without_volume = 0;
-    for (uint64_t region = 0; region < regions_; ++region) {
-      if (!reader_.NextContent(line)) {
-        return CountError(reader_, regions_, "regions", region);
-      }
-      FieldSplitter fields(line, ' ');
-      WELLSPACE_RETURN_IF_ERROR(ReadIndex(reader_, fields, region, base));
-      Surface::Seed seed;
-      WELLSPACE_RETURN_IF_ERROR(ReadPlace(fields, seed));
-      std::string_view field;
-      if (!fields.Next(field)) {
-        return reader_.Error("expected an index, x, y, z, an attribute and perhaps a largest volume, got no attribute");
-      }
-      if (absl::Status status = TakeFinite(field, seed.attribute); !status.ok()) {
-        return reader_.Error(absl::StrCat("attribute: ", status.message()));
-      }
-      if (!fields.Next(field)) {
-        ++without_volume;
-      } else if (absl::Status status = TakeFinite(field, seed.max_volume); !status.ok()) {
-        return reader_.Error(absl::StrCat("largest volume: ", status.message()));
-      }
-      seed.max_volume = std::max(seed.max_volume, 0.0);  // a negative one is none, as for TetGen
-      WELLSPACE_RETURN_IF_ERROR(ExpectNoMore(fields, "an index, x, y, z, an attribute and a largest volume"));
-      AddSeed(seed);
-    }
+    WELLSPACE_RETURN_IF_ERROR(ReadPolySeeds(reader_, 3, [&](const PolySeed& row) {
+      surface_.seeds.push_back({.x = row.at[0],
+                                .y = row.at[1],
+                                .z = row.at[2],
+                                .is_hole = row.is_hole,
+                                .attribute = row.attribute,
+                                .max_volume = row.largest.value_or(0)});
+      surface_.places.front().seeds.Add(reader_.line_number());
+      without_volume += row.is_hole || row.largest.has_value() ? 0 : 1;
+    }));
     if (without_volume > 0) {
       surface_.notes.push_back(absl::StrCat(
           surface_.name, ": of ", without_volume, without_volume == 1 ? " region" : " regions",
@@ -192,39 +153,12 @@ class FacetReader {
     return absl::OkStatus();
   }
 
-  absl::Status ReadPlace(FieldSplitter& fields, Surface::Seed& seed) {
-    for (auto [coordinate, name] : {std::pair{&seed.x, "x"}, std::pair{&seed.y, "y"}, std::pair{&seed.z, "z"}}) {
-      std::string_view field;
-      if (!fields.Next(field)) {
-        return reader_.Error(absl::StrCat("expected an index, x, y and z, got no ", name));
-      }
-      if (absl::Status status = TakeFinite(field, *coordinate); !status.ok()) {
-        return reader_.Error(absl::StrCat(name, ": ", status.message()));
-      }
-    }
-    return absl::OkStatus();
-  }
-
-  void AddSeed(const Surface::Seed& seed) {
-    surface_.seeds.push_back(seed);
-    surface_.seed_places.Add(reader_.line_number());
-  }
-
-  // An error where the fields of the line go on.
-  absl::Status ExpectNoMore(FieldSplitter& fields, std::string_view expected) {
-    std::string_view field;
-    return fields.Next(field)
-               ? reader_.Error(absl::StrCat("expected ", std::string(expected), ", got also ", Quote(field)))
-               : absl::OkStatus();
-  }
-
   LineReader reader_;
   const std::string& path_;
   const bool is_poly_;
   Surface& surface_;
   SurfaceBuilder builder_;
-  uint64_t index_base_ = 0;  // of the points
-  uint64_t regions_ = 0;
+  uint64_t index_base_ = 0;        // of the points
   std::vector<uint32_t> corners_;  // of the polygon that is read
 };
 

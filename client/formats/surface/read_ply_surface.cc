@@ -39,7 +39,7 @@ class PlySurfaceReader {
     WELLSPACE_RETURN_IF_ERROR(rows_.CheckUpTo(*faces));
     WELLSPACE_RETURN_IF_ERROR(ChooseVertices(*vertices));
     WELLSPACE_RETURN_IF_ERROR(ChooseFaces(*faces));
-    surface_.has_lines = rows_.is_ascii();
+    surface_.places.front().has_lines = rows_.is_ascii();
     for (const PlyElement* element = rows_.elements().data(); element <= faces; ++element) {
       for (uint64_t row = 0; row < element->count; ++row) {
         WELLSPACE_RETURN_IF_ERROR(element == vertices ? ReadVertex(*element, row)

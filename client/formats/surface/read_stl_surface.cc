@@ -127,7 +127,7 @@ void NoteFloats(Surface& surface) {
 absl::Status ReadStlSurface(InputFile& file, Surface& surface) {
   WELLSPACE_ASSIGN_OR_RETURN(const bool is_text, IsStlText(file));
   surface.names_points = false;
-  surface.has_lines = is_text;
+  surface.places.front().has_lines = is_text;
   LineReader reader(std::move(file));
   StlParts parts(reader, is_text, InvalidValue::kRefuse);
   WELLSPACE_RETURN_IF_ERROR(StlSurfaceReader(parts, surface).Read());

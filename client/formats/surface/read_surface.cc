@@ -68,6 +68,7 @@ absl::StatusOr<Surface> ReadSurface(const std::string& path, const std::string& 
   WELLSPACE_ASSIGN_OR_RETURN(InputFile file, OpenInflated(path));
   Surface surface;
   surface.name = file.name();
+  surface.places.front().file = surface.name;
   surface.format = (*row)->name;
   WELLSPACE_RETURN_IF_ERROR((*row)->handler(file, path, surface));
   if (surface.corners.empty()) {

@@ -36,8 +36,8 @@ namespace wellspace::formats {
 // The names that the format of a surface may have.
 std::vector<std::string> SurfaceFormats();
 
-// Whether a file has a surface, and is no cloud, unless somebody says so: .stl, .smesh, and .poly whose first line says
-// that it is in 3-D; also with .gz.
+// Whether a file has a surface, and is no cloud, unless an option says so: .stl, .smesh, and .poly whose first line
+// says that it is in 3-D; also with .gz.
 bool IsSurfacePath(const std::string& path);
 
 // Reads the surface of `path` in `format`, or if that is empty in the one that its extension says; "-" is standard

@@ -1,4 +1,4 @@
-// A surface in 3-D as a file has it: points, triangles over them with markers, and seeds of what they bound.
+// A surface in 3-D as files have it: points, triangles over them with markers, and seeds of the solids that they bound.
 #ifndef WELLSPACE_CLIENT_FORMATS_SURFACE_SURFACE_H_
 #define WELLSPACE_CLIENT_FORMATS_SURFACE_SURFACE_H_
 
@@ -14,7 +14,7 @@ namespace wellspace::formats {
 //
 // Thread safety: thread-compatible.
 struct Surface {
-  // Which solids are meant: those that an odd number of triangles separates from outside; all bounded ones without a
+  // The solids that are meant: those that an odd number of triangles separates from outside; all bounded ones without a
   // hole.
   enum class SolidRule : uint8_t { kEvenOdd, kHoles };
 
@@ -38,25 +38,30 @@ struct Surface {
     bool operator==(const Part&) const = default;
   };
 
-  std::string name;               // of the file, as messages say it
+  // Where the triangles and seeds of a file stand in it: lines or, in a file without lines, rows from 0.
+  struct Places {
+    std::string file;  // as messages say it
+    bool has_lines = true;
+    LineIndex triangles;
+    LineIndex seeds;
+  };
+
+  std::string name;               // of the file or files, as messages say it
   std::string format;             // that it was read in
   std::vector<double> points;     // point_count() x 3, row-major
   std::vector<uint32_t> corners;  // triangle_count() x 3, indices of points
   std::vector<int32_t> markers;   // of each triangle; 0 where the file has none
   std::vector<Part> parts;        // markers that have a name, ascending
-  std::vector<Seed> seeds;        // holes first, then regions
+  std::vector<Seed> seeds;        // of each file holes first, then regions
   SolidRule solids = SolidRule::kEvenOdd;
   // Whether triangles share their corners by numbers. Otherwise, in STL, each has corners of its own, of which those
   // that are equal to the bit have been made one.
   bool names_points = true;
   uint64_t cut_polygons = 0;  // of more than three corners, which were cut into triangles
-  // What a user would want to know of how the file was read, a sentence each.
+  // Notes for the user on how the file was read, a sentence each.
   std::vector<std::string> notes;
-
-  // Where things stand in the file: lines or, in a file without lines, rows from 0. See TriangleOrigin.
-  bool has_lines = true;
-  LineIndex triangle_places;
-  LineIndex seed_places;
+  // Of each file; its triangles and seeds come before those of the next one. A file that was read has one.
+  std::vector<Places> places = std::vector<Places>(1);
 
   uint64_t point_count() const { return points.size() / 3; }
   uint64_t triangle_count() const { return corners.size() / 3; }

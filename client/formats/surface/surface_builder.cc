@@ -22,7 +22,7 @@ absl::Status SurfaceBuilder::AddPolygon(std::span<const uint32_t> corners, int32
   }
   while (surface_.markers.size() < surface_.triangle_count()) {
     surface_.markers.push_back(marker);
-    surface_.triangle_places.Add(place);
+    surface_.places.front().triangles.Add(place);
   }
   return absl::OkStatus();
 }

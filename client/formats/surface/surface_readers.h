@@ -1,4 +1,4 @@
-// The readers behind ReadSurface, one for each format. Each fills what a Surface has but its name and its format.
+// The readers behind ReadSurface, one for each format. Each fills a Surface but for its name and its format.
 // Private to this folder.
 #ifndef WELLSPACE_CLIENT_FORMATS_SURFACE_SURFACE_READERS_H_
 #define WELLSPACE_CLIENT_FORMATS_SURFACE_SURFACE_READERS_H_

@@ -1,4 +1,4 @@
-// What readers and writers of TetGen's and Triangle's files share. Private to client/formats.
+// The common part of readers and writers of TetGen's and Triangle's files. Private to client/formats.
 #ifndef WELLSPACE_CLIENT_FORMATS_TETGEN_TETGEN_H_
 #define WELLSPACE_CLIENT_FORMATS_TETGEN_TETGEN_H_
 
@@ -10,8 +10,8 @@ namespace wellspace::formats {
 // The comment ahead of the header of a .node whose attribute is the weight of its points.
 inline constexpr char kWeightsComment[] = "weights";
 
-// What the comment ahead of the header of a .edge, .face or .poly of 0.1 begins with; then come tags, each with its
-// name. Now every name has a comment of its own: see names.h.
+// The first words of the comment ahead of the header of a .edge, .face or .poly of 0.1; then come tags,
+// each with its name. Now every name has a comment of its own: see names.h.
 inline constexpr char kBoundaryComment[] = "boundary:";
 // The same ahead of the header of a .ele of 0.1 with several regions; then come ids, each with a name.
 inline constexpr char kRegionsComment[] = "regions:";

@@ -17,7 +17,7 @@
 namespace wellspace::formats {
 namespace {
 
-// What stands behind the coordinates of a point. Attributes and markers may be missing, as they may for TetGen, but
+// The columns behind the coordinates of a point. Attributes and markers may be missing, as they may for TetGen, but
 // there must not be more than announced.
 absl::Status ReadExtras(LineReader& reader, const NodeHeader& header, uint64_t point, FieldSplitter& fields,
                         NodeExtras& extras) {
@@ -115,6 +115,13 @@ absl::Status ExpectEnd(LineReader& reader, uint64_t count, const char* what) {
                                      ", as the header says, got ", Quote(line)));
   }
   return reader.status();
+}
+
+absl::Status ExpectNoMore(LineReader& reader, FieldSplitter& fields, std::string_view expected) {
+  std::string_view field;
+  return fields.Next(field)
+             ? reader.Error(absl::StrCat("expected ", std::string(expected), ", got also ", Quote(field)))
+             : absl::OkStatus();
 }
 
 absl::Status ReadNodeHeader(LineReader& reader, NodeHeader& header) {

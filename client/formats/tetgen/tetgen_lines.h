@@ -16,10 +16,10 @@
 
 namespace wellspace::formats {
 
-// What a header says is not believed: more is reserved only as more lines arrive.
+// The counts of a header are not believed: more is reserved only as more lines arrive.
 inline constexpr uint64_t kMaxReserved = 1 << 16;
 
-// Reads the unsigned numbers of a header line; those that are missing stay as they are.
+// Reads the unsigned numbers of a header line; missing numbers stay as they are.
 //
 // REQUIRES:   names.size() == values.size() >= required.
 absl::Status ReadHeader(LineReader& reader, std::string_view line, size_t required, std::span<const char* const> names,
@@ -38,6 +38,9 @@ absl::Status CountError(LineReader& reader, uint64_t count, const char* what, ui
 
 absl::Status ExpectEnd(LineReader& reader, uint64_t count, const char* what);
 
+// An error where the fields of the line go on behind the `expected` ones.
+absl::Status ExpectNoMore(LineReader& reader, FieldSplitter& fields, std::string_view expected);
+
 // The header of points, in a .node or at the start of a .poly.
 struct NodeHeader {
   uint64_t count = 0;
@@ -49,7 +52,7 @@ struct NodeHeader {
 
 absl::Status ReadNodeHeader(LineReader& reader, NodeHeader& header);
 
-// What rows of points have besides coordinates.
+// The columns of rows of points besides coordinates.
 struct NodeExtras {
   uint64_t index_base = 0;            // of the first point: 0 or 1
   std::vector<double> weights = {};   // of the points, if the header says that it has weights

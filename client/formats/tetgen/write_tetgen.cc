@@ -19,7 +19,7 @@
 namespace wellspace::formats {
 namespace {
 
-// The files of a mesh. Those of the boundary are there if the mesh has one; the last one for 2-D and 3-D only.
+// The files of a mesh. Files of the boundary are there if the mesh has one; the last one for 2-D and 3-D only.
 struct TetgenFiles {
   OutputFile nodes;
   OutputFile simplices;
@@ -185,7 +185,7 @@ class NodeAndEleWriter final : public MeshWriter {
 
   const MeshShape shape_;
   TetgenFiles files_;
-  std::string region_;  // what ends the line of a simplex
+  std::string region_;  // the end of the line of a simplex
   PartWalk walk_{shape_.boundary};
   RegionQueue regions_;
   uint64_t vertices_written_ = 0;

@@ -12,7 +12,7 @@ constexpr unsigned kDeflateLevel = 4;
 
 }  // namespace
 
-// What could not be written because the disk was full stays in the state of the library, and a try to write it at the
+// Bytes that could not be written because the disk was full stay in the state of the library. A try to write it at the
 // end of the process would crash, so there is to be none: all files are closed.
 std::mutex& Hdf5Mutex() {
   static std::mutex mutex;
@@ -71,6 +71,7 @@ void HdfFile::BeginArrayOf(hid_t type, hid_t group, const char* name, uint64_t r
   const int rank = columns == 1 ? 1 : 2;
   const Handle space(H5Screate_simple(rank, shape, nullptr), H5Sclose);
   const Handle properties(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+  Check(H5Pset_obj_track_times(properties, false) >= 0);  // the same mesh is the same file, whenever it is written
   if (rows > 0) {
     const hsize_t chunk[] = {std::min<hsize_t>(rows, kRowsPerChunk), columns};
     Check(H5Pset_chunk(properties, rank, chunk) >= 0 && H5Pset_shuffle(properties) >= 0 &&

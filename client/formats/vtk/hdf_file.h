@@ -37,7 +37,7 @@ class Handle {
   ~Handle() { Close(); }
 
   operator hid_t() const { return id_; }
-  // Whether that went well; what is buffered goes to the file now.
+  // Whether that went well; buffered bytes go to the file now.
   bool Close() { return id_ < 0 || close_(std::exchange(id_, -1)) >= 0; }
 
  private:
@@ -119,7 +119,7 @@ class HdfFile {
   hsize_t row_ = 0;
 };
 
-// Calls `use` with blocks of as many rows as a chunk, of `width` values each: what is converted takes little memory.
+// Calls `use` with blocks of as many rows as a chunk, of `width` values each: their conversion takes little memory.
 template <typename T, typename Use>
 void ForEachBlock(std::span<const T> values, uint64_t width, Use use) {
   for (; !values.empty(); values = values.subspan(std::min<size_t>(values.size(), kRowsPerChunk * width))) {

@@ -25,7 +25,7 @@ class VtkPointsReader final : public VtkLegacyReader {
 
   absl::Status Read() {
     const absl::Status status = ReadSections();
-    // What follows the points is only looked at to tell of it.
+    // The rest after the points is only looked at to tell of it.
     if (!status.ok() && (WantsData() || !has_points())) {
       return status;
     }

@@ -101,7 +101,7 @@ class VtkXmlPointsReader final : public VtkXmlReader {
     WELLSPACE_RETURN_IF_ERROR(ReadAnyNumbers(array.values));
     const uint64_t wanted = array.components * point_count();
     if (xml().Attribute("type") == "Bit" && array.values.size() > wanted && array.values.size() - wanted < 8) {
-      array.values.resize(wanted);  // what fills the last byte
+      array.values.resize(wanted);  // the bits that fill the last byte
     }
     return absl::OkStatus();
   }

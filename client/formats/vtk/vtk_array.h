@@ -65,7 +65,7 @@ class VtkArrayWriter {
 
 enum class VtkCompressor { kNone, kZlib, kLz4, kLzma };
 
-// How a file says that its arrays are stored.
+// The encoding of its arrays that a file declares.
 struct VtkEncoding {
   VtkCompressor compressor = VtkCompressor::kNone;
   bool big_endian = false;
@@ -74,7 +74,7 @@ struct VtkEncoding {
   bool is_compressed() const { return compressor != VtkCompressor::kNone; }
 };
 
-// The bytes of one array. Sizes in `text` are checked against what is there before anything is allocated by them.
+// The bytes of one array. Sizes in `text` are checked against the bytes there before anything is allocated by them.
 //
 // Errors:     INVALID_ARGUMENT, a message without a location.
 absl::StatusOr<std::string> DecodeVtkArray(std::string_view text, const VtkEncoding& encoding);

@@ -36,9 +36,18 @@ inline constexpr char kVtkRegion[] = "region";
 // Of the file: bytes of the text of NameLines.
 inline constexpr char kVtkNames[] = "wellspace_names";
 
+// Of a part: the numbers in the whole mesh, under names that VTK gives a meaning; who owns what; and which are ghosts.
+inline constexpr char kVtkPointIds[] = "GlobalPointIds";
+inline constexpr char kVtkCellIds[] = "GlobalCellIds";
+inline constexpr char kVtkOwner[] = "owner";
+inline constexpr char kVtkRow[] = "row";
+inline constexpr char kVtkGhosts[] = "vtkGhostType";
+// VTK's bit for a point or a cell that another piece has, too.
+inline constexpr uint8_t kVtkDuplicate = 1;
+
 // Whether cells have data.
 inline bool HasCellData(const MeshShape& shape) {
-  return !shape.boundary.empty() || shape.has_simplex_regions || !shape.regions.empty();
+  return !shape.boundary.empty() || shape.has_simplex_regions || !shape.regions.empty() || shape.part != nullptr;
 }
 
 // The type of a cell of `size` vertices in a section of polygonal data, as either format calls it.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
 #include <utility>
 
 #include "absl/strings/ascii.h"
@@ -63,7 +62,7 @@ absl::Status VtkLegacyReader::ReadSections() {
   return has_points_ ? absl::OkStatus() : reader_.Error("the file ends; expected \"POINTS\"");
 }
 
-// The only lines: what follows them are words.
+// The only lines: words follow them.
 absl::Status VtkLegacyReader::ReadHeader() {
   std::string_view line;
   if (!reader_.Next(line) || line.substr(0, 22) != "# vtk DataFile Version") {
@@ -425,16 +424,8 @@ absl::Status VtkLegacyReader::NextNumber(double& value) {
   if (!NextWord(word)) {
     return reader_.EndError("the file ends; expected a number");
   }
-  switch (ReadCoordinate(word, value)) {
-    case CoordinateKind::kFinite:
-      return absl::OkStatus();
-    case CoordinateKind::kInvalid:
-      value = std::numeric_limits<double>::quiet_NaN();
-      return absl::OkStatus();
-    case CoordinateKind::kNone:
-      break;
-  }
-  return reader_.Error(absl::StrCat("expected a number, got ", Quote(word)));
+  return ReadOrNan(word, value) ? absl::OkStatus()
+                                : reader_.Error(absl::StrCat("expected a number, got ", Quote(word)));
 }
 
 absl::Status VtkLegacyReader::EndError(uint64_t count, uint64_t taken) const {

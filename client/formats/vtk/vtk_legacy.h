@@ -37,7 +37,7 @@ class VtkLegacyReader {
   // The numbers of an array, a column for each component.
   using Columns = std::vector<std::vector<double>>;
 
-  // An array of what the file has of its points, of its cells, or of neither.
+  // An array of the file: about its points, its cells, or neither.
   struct Data {
     enum class Of { kFile, kPoints, kCells };
     Of of = Of::kFile;
@@ -60,7 +60,7 @@ class VtkLegacyReader {
   // cell is a number of vertices, then these. Of CELL_TYPES, `numbers` are the types.
   virtual absl::Status UseCells(std::string_view keyword, uint64_t cells, const std::vector<double>& offsets,
                                 const std::vector<double>& numbers) = 0;
-  // Whether what follows need not be looked at.
+  // Whether the rest need not be looked at.
   virtual bool IsDone() const { return false; }
 
   // All sections. Errors: of the reader; INVALID_ARGUMENT at a line or a byte, also if there are no points.
@@ -102,7 +102,7 @@ class VtkLegacyReader {
   absl::Status EndError(uint64_t count, uint64_t taken) const;
 
   LineReader& reader_;
-  FieldSplitter line_{"", ' '};  // what is left of the line
+  FieldSplitter line_{"", ' '};  // the rest of the line
   std::string pending_;          // a word that was looked at, and not taken
   bool has_pending_ = false;
   bool is_ascii_ = true;
@@ -110,7 +110,7 @@ class VtkLegacyReader {
   std::string word_;     // the same as the file has it
   std::string dataset_;
   bool has_points_ = false;
-  bool ends_early_ = false;  // what follows cannot be read
+  bool ends_early_ = false;  // the rest cannot be read
   Data::Of of_ = Data::Of::kFile;
   uint64_t point_count_ = 0;
   uint64_t data_count_ = 0;

@@ -1,4 +1,4 @@
-// Meshes in VTK's XML: what unstructured grids and polygonal data have in common. Private to this folder.
+// Meshes in VTK's XML: the common part of unstructured grids and polygonal data. Private to this folder.
 #ifndef WELLSPACE_CLIENT_FORMATS_VTK_VTK_MESH_XML_H_
 #define WELLSPACE_CLIENT_FORMATS_VTK_VTK_MESH_XML_H_
 

@@ -32,7 +32,7 @@ VtkXmlReader::VtkXmlReader(std::string_view document, std::string name, std::str
   FindAppended(document);
 }
 
-// Arrays refer to what stands behind them, and may be bytes, which are no elements: that is looked for first.
+// Arrays refer to appended data behind them, and may be bytes, which are no elements: that is looked for first.
 void VtkXmlReader::FindAppended(std::string_view document) {
   if (document.find("<AppendedData") == std::string_view::npos) {
     return;
@@ -284,14 +284,8 @@ absl::Status VtkXmlReader::ReadAnyNumbers(std::vector<double>& values) {
     while ((begin = text.find_first_not_of(kXmlSpace, begin)) != std::string_view::npos) {
       const size_t end = std::min(text.find_first_of(kXmlSpace, begin), text.size());
       double value = 0;
-      switch (ReadCoordinate(text.substr(begin, end - begin), value)) {
-        case CoordinateKind::kFinite:
-          break;
-        case CoordinateKind::kInvalid:
-          value = std::numeric_limits<double>::quiet_NaN();
-          break;
-        case CoordinateKind::kNone:
-          return xml_.Error(absl::StrCat("expected a number, got ", Quote(text.substr(begin, end - begin))));
+      if (!ReadOrNan(text.substr(begin, end - begin), value)) {
+        return xml_.Error(absl::StrCat("expected a number, got ", Quote(text.substr(begin, end - begin))));
       }
       values.push_back(value);
       begin = end;

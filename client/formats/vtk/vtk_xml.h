@@ -87,7 +87,7 @@ class VtkXmlReader {
   const std::string kind_;
   std::vector<std::string> path_;  // the open elements, outermost first
   VtkEncoding encoding_;
-  bool is_at_appended_ = false;  // the end of what is looked at as elements
+  bool is_at_appended_ = false;  // the end of the part that is read as elements
   bool has_appended_ = false;
   bool is_appended_base64_ = false;
   std::string_view appended_;  // behind its '_'

@@ -184,7 +184,7 @@ class VtkHdfWriter final : public MeshWriter {
     file_->BeginArray<T>(point_data, name, shape_.vertex_count);
   }
 
-  // What ends the array of regions: facets have none.
+  // The end of the array of regions: facets have none.
   void AddRegionsOfFacets() {
     const std::vector<int32_t> zeros(std::min<uint64_t>(shape_.facet_count(), kRowsPerChunk));
     for (uint64_t done = 0; done < shape_.facet_count(); done += kRowsPerChunk) {

@@ -180,15 +180,62 @@ class VtuWriter final : public MeshWriter {
 
   void EndPointData() {
     BeginPointData();
+    if (shape_.part != nullptr) {
+      WritePartOfPoints(*shape_.part);
+    }
     EndArray();
     output_.Write("      </PointData>\n");
+  }
+
+  void WritePartOfPoints(const PartNumbers& part) {
+    NextOfPointData("Int64", kVtkPointIds, sizeof(int64_t));
+    AddEach<int64_t>(part.vertex_ids);
+    NextOfPointData("Int32", kVtkOwner, sizeof(int32_t));
+    AddEach<int32_t>(part.vertex_owners);
+    NextOfPointData("Int64", kVtkRow, sizeof(int64_t));
+    AddEach<int64_t>(part.vertex_rows);
+    NextOfPointData("UInt8", kVtkGhosts, sizeof(uint8_t));
+    AddGhosts(part.own_vertices, shape_.vertex_count);
+  }
+
+  // Facets are numbered behind the simplices of the whole mesh, and are no ghosts.
+  void WritePartOfCells(const PartNumbers& part) {
+    BeginCellData("Int64", kVtkCellIds, sizeof(int64_t));
+    AddEach<int64_t>(part.simplex_ids);
+    AddEach<int64_t>(part.facet_ids, static_cast<int64_t>(part.whole_simplices));
+    EndArray();
+    BeginCellData("Int32", kVtkOwner, sizeof(int32_t));
+    AddEach<int32_t>(part.simplex_owners);
+    AddRepeated(static_cast<int32_t>(part.part), shape_.facet_count());
+    EndArray();
+    BeginCellData("UInt8", kVtkGhosts, sizeof(uint8_t));
+    AddGhosts(part.own_simplices, shape_.simplex_count);
+    AddGhosts(shape_.facet_count(), shape_.facet_count());
+    EndArray();
+  }
+
+  template <typename T>
+  void AddEach(std::span<const uint32_t> values, T before = 0) {
+    for (size_t i = 0; i < values.size() && Status().ok(); ++i) {
+      array_->Add<T>(before + static_cast<T>(values[i]));
+    }
+  }
+
+  void AddGhosts(uint64_t own, uint64_t count) {
+    for (uint64_t i = 0; i < count && Status().ok(); ++i) {
+      array_->Add<uint8_t>(i < own ? 0 : kVtkDuplicate);
+    }
+  }
+
+  void BeginCellData(const char* type, const char* name, uint64_t value_bytes) {
+    BeginArray(absl::StrCat("type=\"", type, "\" Name=\"", name, "\""), VtkCellCount(shape_) * value_bytes);
   }
 
   void BeginRegions() {
     if (!std::exchange(has_regions_, true)) {
       EndPointData();
       output_.Write("      <CellData>\n");
-      BeginArray(absl::StrCat("type=\"Int32\" Name=\"", kVtkRegion, "\""), VtkCellCount(shape_) * sizeof(int32_t));
+      BeginCellData("Int32", kVtkRegion, sizeof(int32_t));
     }
   }
 
@@ -207,11 +254,14 @@ class VtuWriter final : public MeshWriter {
     if (!shape_.boundary.empty()) {
       WriteTags();
     }
+    if (shape_.part != nullptr) {
+      WritePartOfCells(*shape_.part);
+    }
     output_.Write("      </CellData>\n");
   }
 
   void WriteTags() {
-    BeginArray(absl::StrCat("type=\"Int32\" Name=\"", kVtkBoundary, "\""), VtkCellCount(shape_) * sizeof(int32_t));
+    BeginCellData("Int32", kVtkBoundary, sizeof(int32_t));
     AddRepeated(0, shape_.simplex_count);
     for (const BoundaryPart& part : shape_.boundary) {
       AddRepeated(part.tag, part.facets);

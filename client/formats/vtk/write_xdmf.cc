@@ -13,26 +13,22 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_replace.h"
 #include "client/formats/boundary.h"
 #include "client/formats/io/output_file.h"
 #include "client/formats/mesh_writers.h"
 #include "client/formats/vtk/hdf_file.h"
 #include "client/formats/vtk/vtk_cells.h"
+#include "client/formats/vtk/xml_scanner.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
 
-// What XDMF says of an array: its kind of numbers, and bytes of each.
+// The attributes of an array in XDMF: its kind of numbers, and bytes of each.
 constexpr char kXdmfDouble[] = "NumberType=\"Float\" Precision=\"8\"";
 constexpr char kXdmfInt64[] = "NumberType=\"Int\" Precision=\"8\"";
 constexpr char kXdmfInt32[] = "NumberType=\"Int\" Precision=\"4\"";
 constexpr char kXdmfByte[] = "NumberType=\"UChar\" Precision=\"1\"";
-
-std::string XmlText(const std::string& text) {
-  return absl::StrReplaceAll(text, {{"&", "&amp;"}, {"<", "&lt;"}, {">", "&gt;"}, {"\"", "&quot;"}});
-}
 
 // A grid, and its arrays.
 struct XdmfPair {
@@ -129,7 +125,7 @@ class XdmfWriter final : public MeshWriter {
                                                      .simplices = simplices_,
                                                      .facets = facets_,
                                                      .attribute_values = attribute_values_}));
-    // No file appears before all are written, and arrays before what refers to them.
+    // No file appears before all are written, and arrays before the file that refers to them.
     std::vector<OutputFile*> outputs;
     WriteMeshGrid();
     if (boundary_.has_value()) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_replace.h"
 #include "client/formats/io/number.h"
 
 namespace wellspace::formats {
@@ -16,6 +17,10 @@ std::string_view SkipSpace(std::string_view text) {
 }
 
 }  // namespace
+
+std::string XmlText(const std::string& text) {
+  return absl::StrReplaceAll(text, {{"&", "&amp;"}, {"<", "&lt;"}, {">", "&gt;"}, {"\"", "&quot;"}});
+}
 
 std::string_view XmlScanner::Attribute(std::string_view attribute) const {
   for (const auto& [key, value] : attributes_) {

@@ -12,8 +12,11 @@
 
 namespace wellspace::formats {
 
-// What separates attributes, and numbers of a list.
+// The separators of attributes, and of numbers of a list.
 inline constexpr std::string_view kXmlSpace = " \t\r\n";
+
+// `text` as it stands in an element, or between quotes of an attribute.
+std::string XmlText(const std::string& text);
 
 // Reads a document piece by piece; comments, declarations and instructions are skipped, entities are left as they are.
 //
@@ -34,7 +37,7 @@ class XmlScanner {
   std::string_view value() const { return value_; }
   // An attribute of the start tag that was returned last; empty when it has none of this name.
   std::string_view Attribute(std::string_view attribute) const;
-  // Where the piece that was returned last ends in the document.
+  // The end of the piece that was returned last, in the document.
   size_t position() const { return position_; }
   // INVALID_ARGUMENT, at the line of the piece that was returned last.
   absl::Status Error(std::string_view message) const;

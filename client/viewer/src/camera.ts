@@ -73,14 +73,14 @@ export class Camera {
     this.pitch = Math.min(Math.PI / 2 - 1e-3, Math.max(-Math.PI / 2 + 1e-3, this.pitch + dy));
   }
 
-  /** Moves what is seen by so many pixels to the right and down. */
+  /** Moves the picture by so many pixels to the right and down. */
   pan(dx: number, dy: number): void {
     const right = new Vector3().setFromMatrixColumn(this.three.matrixWorld, 0);
     const upward = new Vector3().setFromMatrixColumn(this.three.matrixWorld, 1);
     this.target.addScaledVector(right, -dx * this.pixel).addScaledVector(upward, dy * this.pixel);
   }
 
-  /** Brings the target nearer, for a factor below 1; what is `x`, `y` pixels from the middle stays there. */
+  /** Brings the target nearer, for a factor below 1; the place `x`, `y` pixels from the middle stays there. */
   zoom(factor: number, x = 0, y = 0): void {
     const before = this.distance;
     this.distance = Math.min(FARTHEST, Math.max(NEAREST, before * factor));

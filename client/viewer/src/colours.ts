@@ -30,7 +30,7 @@ const CATEGORIES: readonly Rgb[] = [
 ];
 const SHADES = [1, 0.72, 0.5];
 
-/** What has no part, no region or no number. */
+/** The colour of elements without a part, a region or a number. */
 export const PLAIN: Rgb = [176, 182, 190];
 
 /** The colour of a number in [0, 1]. */
@@ -63,5 +63,5 @@ export function textureOf(kind: "ramp" | "categories"): Uint8Array {
   return pixels;
 }
 
-/** Where the texture has a category; −1 stands for PLAIN. */
+/** The place of a category in the texture; −1 stands for PLAIN. */
 export const categoryValue = (index: number): number => (index < 0 ? -1 : ((index % COLOURS) + 0.5) / COLOURS);

@@ -124,7 +124,7 @@ function orient(p: Float64Array, s: Uint32Array): void {
   }
 }
 
-/** Reads the mesh of this page. Throws a DataError that says what is wrong with it. */
+/** Reads the mesh of this page. Throws a DataError that names the fault. */
 export function readMesh(): MeshData {
   const header = JSON.parse(elementText("mesh")) as Header;
   if (header.format !== 1) throw new DataError(`The mesh has format ${header.format}; this page reads format 1.`);

@@ -1,4 +1,4 @@
-// What is drawn beside the mesh: axes, a scale for maps, and the legend of a saved picture.
+// Decorations beside the mesh: axes, a scale for maps, and the legend of a saved picture.
 
 import { Vector3 } from "three";
 import { categoryColour, cssColour, rampColour } from "./colours.js";

@@ -5,7 +5,7 @@ import type { View } from "./view.js";
 const STILL = 4; // pixels that a click may move
 const TURN = 0.008; // radians a pixel
 
-/** Sends what happens on the canvas to the camera. `click` gets a place, from −1 to 1; `hover` one or null. */
+/** Sends gestures on the canvas to the camera. `click` gets a place, from −1 to 1; `hover` one or null. */
 export function listen(
   canvas: HTMLCanvasElement,
   view: View,

@@ -5,7 +5,7 @@ import { rangeOf, type Measure } from "./measures.js";
 
 export const BINS = 36;
 
-/** How numbers become colours and bins. */
+/** The scale by which numbers become colours and bins. */
 export class Scale {
   readonly low: number;
   readonly high: number;
@@ -18,7 +18,7 @@ export class Scale {
     this.isLogarithmic = measure.logarithmic && this.low > 0 && this.high > 20 * this.low;
   }
 
-  /** In [0, 1] for what lies in the range; NaN for what is no number. */
+  /** In [0, 1] for a number in the range; NaN for one that is none. */
   at(value: number): number {
     return this.isLogarithmic
       ? Math.log(value / this.low) / Math.log(this.high / this.low)

@@ -1,4 +1,4 @@
-// A page that shows a mesh: what happens once it has loaded.
+// A page that shows a mesh: its start, once it has loaded.
 
 import { DataError, readMesh } from "./data.js";
 import { drawAxes, rulerOf, savePicture } from "./decorations.js";

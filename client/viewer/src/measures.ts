@@ -5,9 +5,9 @@ import type { MeshData } from "./data.js";
 export interface Measure {
   readonly id: string;
   readonly label: string;
-  /** What follows a number. */
+  /** The unit that follows a number. */
   readonly unit: string;
-  /** Which end is bad. */
+  /** The bad end of the values. */
   readonly worst: "low" | "high" | null;
   readonly logarithmic: boolean;
   /** One number for each element; NaN where there is none. */

@@ -1,4 +1,4 @@
-// The controls beside the picture. What comes from a file is text, never markup.
+// The controls beside the picture. Names from a file are text, never markup.
 
 import { Vector3 } from "three";
 import { categoryColour, cssColour, PLAIN, rampColour } from "./colours.js";
@@ -214,7 +214,7 @@ export class Panel {
       offset.setAttribute("aria-valuetext", view.planeText());
       view.change("surface");
     };
-    /** Who moves the plane wants to see it. */
+    /** A user who moves the plane wants to see it. */
     const turnOn = (): void => {
       on.checked = cut.on = true;
       changed();
@@ -297,7 +297,7 @@ export class Panel {
     );
   }
 
-  /** Shows what is known of an element, and marks it; null: of none. */
+  /** Shows the data of an element, and marks it; null: of none. */
   choose(hit: Hit | null): void {
     const { view } = this;
     view.chosen = hit;

@@ -1,4 +1,4 @@
-// What three.js draws: triangles coloured by one number a corner, with their edges; and lines of some pixels' width.
+// Drawables of three.js: triangles coloured by one number a corner, with their edges; and lines of some pixels' width.
 
 import {
   BufferAttribute,
@@ -60,7 +60,7 @@ void main() {
   if (over > 0.0) discard;
   vec3 base = number < 0.0 || isnan(number) ? plain : texture(colours, vec2(number, 0.5)).rgb;
   vec3 normal = normalize(cross(dFdx(viewed), dFdy(viewed)));
-  // A lamp on either side of the eye: what looks to the right is darker than what looks to the left, and none is black.
+  // A lamp on either side of the eye: sides to the right are darker than sides to the left, and none is black.
   float light = 0.56;
   light += 0.34 * max(0.0, dot(normal, vec3(-0.35, 0.58, 0.735)));
   light += 0.2 * max(0.0, dot(normal, vec3(0.7, 0.1, 0.707)));
@@ -236,7 +236,7 @@ export class Picture {
     this.shared.edges.value = strength;
   }
 
-  /** Discards what lies at normal·x > offset; null: nothing. */
+  /** Discards points at normal·x > offset; null: none. */
   setClip(normal: readonly number[] | null, offset: number): void {
     this.clip.value = normal ? [...normal, offset] : [0, 0, 0, 1];
   }

@@ -3,7 +3,7 @@
 import type { MeshData } from "./data.js";
 import { TET_FACES, type Topology } from "./topology.js";
 
-/** Keeps what lies at normal·x ≤ offset. */
+/** Keeps the part at normal·x ≤ offset. */
 export interface CutPlane {
   readonly normal: readonly [number, number, number];
   readonly offset: number;
@@ -44,7 +44,7 @@ export function heightsOver(mesh: MeshData, plane: CutPlane): Float64Array {
   return heights;
 }
 
-/** Which of the elements of `shown` have their centre on the side of the plane that is kept. */
+/** The elements of `shown` that have their centre on the side of the plane that is kept. */
 export function keptBelow(mesh: MeshData, shown: Uint8Array, heights: Float64Array): Uint8Array {
   const s = mesh.simplices;
   const kept = new Uint8Array(shown.length);
@@ -103,7 +103,7 @@ export function shrunkFaces(topology: Topology, shown: Uint8Array, seen: Uint32A
   return faces;
 }
 
-/** Where the picture has its origin and its unit. */
+/** The origin and the unit of the picture. */
 export interface Frame {
   readonly origin: readonly [number, number, number];
   readonly scale: number;

@@ -1,4 +1,4 @@
-// Which tetrahedra share a face, and which of their faces are facets of the boundary.
+// The topology of tetrahedra: neighbours across faces, and faces that are facets of the boundary.
 
 import type { MeshData } from "./data.js";
 

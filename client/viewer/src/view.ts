@@ -30,7 +30,7 @@ export interface Cut {
   kind: "whole" | "flat";
 }
 
-/** What was clicked. */
+/** The element that was clicked. */
 export interface Hit {
   readonly element: number;
   /** 1 + the index of the facet's part, or 0. */
@@ -40,7 +40,7 @@ export interface Hit {
 
 const AXIS_NAMES = ["x", "y", "z"];
 const BOX_NAMES = AXIS_NAMES.flatMap((axis) => [`${axis}min`, `${axis}max`]);
-/** Where a corner of a triangle has no number, the triangle has none: what is between would be made up. */
+/** Where a corner of a triangle has no number, the triangle has none: numbers between would be made up. */
 function plainIfOneIs(values: Float32Array, at: number): void {
   if (values[at] < 0 || values[at + 1] < 0 || values[at + 2] < 0) values.fill(-1, at, at + 3);
 }
@@ -49,7 +49,7 @@ function plainIfOneIs(values: Float32Array, at: number): void {
 const NEAR_SEGMENT = 5;
 /** The corners of the faces of a tetrahedron as they are drawn; then those of a triangle. */
 const FACES: ReadonlyArray<readonly number[]> = [...TET_FACES, [0, 1, 2]];
-/** Where numbers of 32 bits get too coarse for what is seen, the frame is moved there. */
+/** Where numbers of 32 bits get too coarse for the visible part, the frame is moved there. */
 const FAR_FROM_ORIGIN = 2000;
 
 export class View {
@@ -180,8 +180,7 @@ export class View {
     if (!this.scheduled) {
       this.scheduled = true;
       requestAnimationFrame(() => {
-        this.scheduled = false;
-        this.drawNow();
+        if (this.scheduled) this.drawNow();
       });
     }
   }
@@ -251,7 +250,9 @@ export class View {
     return axis >= 0 ? `${AXIS_NAMES[axis]} = ${normal[axis] * number}` : `n·x = ${number}`;
   }
 
+  /** Draws what has changed; a frame that was asked for draws nothing then. */
   drawNow(): void {
+    this.scheduled = false;
     if (this.camera.distance < 1e-2 && this.camera.target.length() > FAR_FROM_ORIGIN * this.camera.distance) {
       this.moveOrigin(this.toMesh(this.camera.target));
     }
@@ -413,7 +414,7 @@ export class View {
     return Array.from(this.mesh.points.subarray(this.dimension * vertex, this.dimension * (vertex + 1)));
   }
 
-  /** What is seen at this place of the canvas, from −1 to 1 to the right and upward. */
+  /** The element seen at this place of the canvas, from −1 to 1 to the right and upward. */
   hitAt(x: number, y: number): Hit | null {
     this.camera.update(this.width, this.height);
     const from = new Vector3(x, y, -1).unproject(this.camera.three);

@@ -13,7 +13,7 @@
 
 namespace wellspace::core {
 
-// For arrays that are filled as they grow: those of at least one large page have a mapping of their own, smaller ones
+// For arrays that are filled as they grow: arrays of at least one large page have a mapping of their own, smaller ones
 // share large pages, and small ones lie on the heap.
 template <typename T>
 struct HugePageAllocator {
@@ -51,7 +51,7 @@ struct HugePageAllocator {
   }
 
  private:
-  // Under AddressSanitizer none: between arrays of the heap it sees what is read beyond their ends.
+  // Under AddressSanitizer none: between arrays of the heap it detects reads beyond their ends.
 #ifdef __SANITIZE_ADDRESS__
   static constexpr size_t kLeastShared = kHugePage;
 #else

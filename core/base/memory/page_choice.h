@@ -11,9 +11,9 @@ namespace wellspace::core {
 inline constexpr size_t kHugePage = size_t{1} << 21;
 inline constexpr size_t kSmallPage = size_t{1} << 12;
 
-// Large pages are better to work on, and mostly come sooner. Where the host of a virtual machine takes back what is
-// free, it takes back whole ones, and finds each anew in milliseconds, while the system keeps small ones at hand: there
-// those are taken, and after a while a large one is tried again.
+// Large pages are better to work on, and mostly come sooner. But the host of a virtual machine may take free memory
+// back: whole large pages, and each is found anew in milliseconds, while the system keeps small ones at hand.
+// There small ones are taken, and after a while a large one is tried again.
 //
 // Thread safety: thread-safe.
 class PageChoice {
@@ -21,14 +21,14 @@ class PageChoice {
   // Bytes that are mapped between two tries where large pages are dear.
   static constexpr int64_t kBetweenTries = 64 * int64_t{kHugePage};
 
-  // Whether `bytes` that are about to be mapped are to lie on large pages. If so, IsDear is to be told what the first
-  // of them took.
+  // Whether `bytes` that are about to be mapped are to lie on large pages. If so, IsDear is to be told the time that
+  // the first of them took.
   bool TakesLarge(size_t bytes) {
     return until_try_.load(std::memory_order_relaxed) <= 0 ||
            until_try_.fetch_sub(static_cast<int64_t>(bytes), std::memory_order_relaxed) <= 0;
   }
 
-  // Whether a large page that took so many nanoseconds was dear, where as much memory on small ones takes small_ns();
+  // Whether a large page that took this many nanoseconds was dear, where as much memory on small ones takes small_ns();
   // then small ones are taken from now on.
   template <typename SmallNs>
   bool IsDear(double large_ns, SmallNs small_ns) {
@@ -40,7 +40,7 @@ class PageChoice {
   }
 
  private:
-  // What a large page is worth while it is worked on, in nanoseconds: where either is at hand, a mesh is made 1.07
+  // The worth of a large page while it is worked on, in nanoseconds: where either is at hand, a mesh is made 1.07
   // times as fast on large pages as on small ones.
   static constexpr double kWorth = 1e6;
 

@@ -11,13 +11,13 @@
 
 namespace wellspace::core {
 
-// Maps so many bytes, rounded up to whole pages of 2 MiB, to the beginning of one, and, unless they are dear
-// (PageChoice), asks for such pages: one fault brings one in, where small ones take 512. What is given back then is the
+// Maps this number of bytes, rounded up to whole pages of 2 MiB, to the beginning of one, and, unless they are dear
+// (PageChoice), asks for such pages: one fault brings one in, where small ones take 512. Memory given back is the
 // system's at once, where the heap would keep it: arrays that are moved as they grow leave more than they need behind.
 // Throws std::bad_alloc if the system has none.
 void* MapHugePages(size_t bytes);
 
-// Takes back what MapHugePages(bytes) returned.
+// Unmaps the memory that MapHugePages(bytes) returned.
 void UnmapHugePages(void* memory, size_t bytes);
 
 // Arrays smaller than a large page, in runs of small ones: the first by address that is free. Large pages are mapped as
@@ -26,20 +26,20 @@ void UnmapHugePages(void* memory, size_t bytes);
 // Thread safety: thread-safe.
 class PagePool {
  public:
-  // The one that all share; it is never destroyed.
+  // The pool that all share; it is never destroyed.
   static PagePool& Shared();
 
-  // Memory that begins at a page. What is in it is not known. Throws std::bad_alloc if the system has none.
+  // Memory that begins at a page. Its contents are not known. Throws std::bad_alloc if the system has none.
   //
   // REQUIRES:   0 < bytes <= kHugePage.
   // Complexity: O(large pages mapped).
   void* Take(size_t bytes);
 
-  // Takes back what Take(bytes) returned.
+  // Takes back the memory that Take(bytes) returned.
   void GiveBack(void* memory, size_t bytes);
 
  private:
-  // Which pages of a large one are taken.
+  // The map of the small pages of a large one that are taken.
   class Pages {
    public:
     bool HasFree(size_t count) const { return longest_free_ >= count; }

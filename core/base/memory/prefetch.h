@@ -1,4 +1,4 @@
-// Asking the memory for what will soon be read.
+// Prefetching: asking the memory for data that will soon be read.
 #ifndef WELLSPACE_CORE_BASE_MEMORY_PREFETCH_H_
 #define WELLSPACE_CORE_BASE_MEMORY_PREFETCH_H_
 
@@ -8,14 +8,14 @@
 
 namespace wellspace::core {
 
-// Asks for the line of the cache that `address` is in, which need not be anybody's.
+// Asks for the line of the cache that `address` is in, which need not be mapped.
 inline void PrefetchLine(const void* address) {
   __builtin_prefetch(address);
   asm volatile("");  // a function that did nothing else would have no effect for g++, which drops calls of such
 }
 
-// For items that are worked on one after the other, where what the work begins with is found in steps: calls
-// prefetch(item, step) for those that come some places after the one in place `at`, the first step the farthest ahead.
+// For items that are worked on one after the other, and whose data are found in several steps: calls
+// prefetch(item, step) for items that come some places after the one in place `at`, the first step the farthest ahead.
 template <typename T, typename Prefetch>
 void PrefetchAhead(std::span<T> items, size_t at, Prefetch prefetch) {
   constexpr std::array<size_t, 3> kAhead = {8, 4, 2};

@@ -31,7 +31,7 @@ WELLSPACE_INLINE uint32_t Bits(const typename Wide<kWidth>::Mask& mask) {
 #endif
 }
 
-// The same for floats; also of signs.
+// The bits of a mask for floats; also of signs.
 template <VectorUnit kUnit>
 WELLSPACE_INLINE uint32_t Bits(const FloatMask& mask) {
 #if defined(WELLSPACE_X86_BUILTINS)

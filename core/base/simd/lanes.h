@@ -1,4 +1,4 @@
-// Doubles that are worked on side by side, with what the processor has.
+// Doubles that are worked on side by side, in the vectors of the processor.
 #ifndef WELLSPACE_CORE_BASE_SIMD_LANES_H_
 #define WELLSPACE_CORE_BASE_SIMD_LANES_H_
 
@@ -16,7 +16,7 @@ constexpr size_t PaddedCount(size_t count) { return (count + kLanes - 1) / kLane
 
 // The instructions that columns are worked on with; the results are the same to the bit.
 enum class VectorUnit {
-  kBaseline,  // what every processor of the architecture has
+  kBaseline,  // the instructions of every processor of the architecture
   kAvx2,
 };
 
@@ -71,7 +71,7 @@ WELLSPACE_INLINE Vector Shuffled(const Vector& a, const Order& order) {
 #define WELLSPACE_SHUFFLE(...) __builtin_shuffle(__VA_ARGS__)
 #endif
 
-// Doubles in one vector, what a comparison of them gives (-1 where it holds, else 0), and as wide a vector of integers
+// Doubles in one vector, the result of comparing them (-1 where it holds, else 0), and as wide a vector of integers
 // of 32 bits.
 template <size_t kWidth>
 struct Wide;
@@ -88,7 +88,7 @@ struct Wide<4> {
   using Halves = int32_t __attribute__((vector_size(32), may_alias));
 };
 
-// Eight floats, and what a comparison of them gives: one vector with AVX2, else two.
+// Eight floats, and the result of comparing them: one vector with AVX2, else two.
 using Floats = float __attribute__((vector_size(32), may_alias));
 using FloatMask = int32_t __attribute__((vector_size(32), may_alias));
 inline constexpr size_t kFloatLanes = 8;

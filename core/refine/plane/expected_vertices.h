@@ -16,7 +16,8 @@
 
 namespace wellspace::core {
 
-// What a batch expects to be inserted, by provisional numbers: neither the structure nor the domain knows of it.
+// The vertices that a batch expects to be inserted, by provisional numbers: neither the structure nor the domain knows
+// of it.
 //
 // Thread safety: thread-compatible.
 class ExpectedVertices {

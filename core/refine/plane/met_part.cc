@@ -12,7 +12,7 @@
 namespace wellspace::core {
 namespace {
 
-// A part of a segment that is shorter than this, relative to its distance from the site, is what was rounded.
+// A part of a segment that is shorter than this, relative to its distance from the site, may come from rounding.
 constexpr double kLeastPart = 1e-9;
 
 // Whether all nodes of `cell` lie on one side of a line, surely: the one through `from`, relative to the site, in the
@@ -37,7 +37,7 @@ struct SeenSegment {
   double away = 0;  // of the line from the site, with a sign
   double foot = 0;  // how far along the point nearest to the site is
 
-  // Looks at `segment`; false if it is beyond the reach of `cell`, and what is here makes no sense.
+  // Looks at `segment`; false if it is beyond the reach of `cell`, and then the members are not valid.
   bool LookAt(const PlanarDomain& domain, const Polytope<2>& cell, uint32_t segment) {
     const Point<2>& a = domain.EndOf(segment, false);
     length = domain.LengthOf(segment);
@@ -53,7 +53,7 @@ struct SeenSegment {
     return NormSq<2>({from[0] + foot * along[0], from[1] + foot * along[1]}) <= reach_sq;
   }
 
-  // What is rounded of places on the segment beside a cell of that reach, and more.
+  // The rounding of places on the segment beside a cell of that reach, and more.
   double RoundingIn(const Polytope<2>& cell) const {
     return kLeastPart * (std::abs(from[0]) + std::abs(from[1]) + std::sqrt(cell.reach_sq()));
   }

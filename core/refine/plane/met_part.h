@@ -1,4 +1,4 @@
-// Which segment a cell meets: rule 1 of a domain begins with it (PlaneRules::AssessCell).
+// The segment that a cell meets: rule 1 of a domain begins with it (PlaneRules::AssessCell).
 #ifndef WELLSPACE_CORE_REFINE_PLANE_MET_PART_H_
 #define WELLSPACE_CORE_REFINE_PLANE_MET_PART_H_
 
@@ -29,7 +29,7 @@ struct MetPart {
 bool MayMeetAny(const PlanarDomain& domain, VertexId v, const Polytope<2>& cell, std::span<const uint32_t> segments);
 
 // The part of the nearest of `segments` that `cell`, that of `v`, meets though v is not on it; of those that are as
-// near the one of the lowest number. A part that is no longer than what is rounded does not count, nor do segments that
+// near the one of the lowest number. A part that is no longer than rounding errors does not count, nor do segments that
 // are `passed_over`.
 //
 // REQUIRES:   the nodes of the cell are placed.

@@ -1,4 +1,4 @@
-// What a node of a cell in the plane is between. PlaneRules looks at each node of a cell so: which triangle stands
+// The surroundings of a node of a cell in the plane. PlaneRules looks at each node of a cell so: which triangle stands
 // behind it, in which direction that lies, and by which name the node is known.
 #ifndef WELLSPACE_CORE_REFINE_PLANE_NODE_VIEW_H_
 #define WELLSPACE_CORE_REFINE_PLANE_NODE_VIEW_H_

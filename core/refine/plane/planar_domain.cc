@@ -17,7 +17,7 @@ double PseudoAngle(const Point<2>& d) {
   return d[1] < 0 ? 4 + t : t;
 }
 
-// The same from the direction of pseudo-angle `from` on.
+// PseudoAngle from the direction of pseudo-angle `from` on.
 double PseudoAngleFrom(double from, const Point<2>& d) {
   const double angle = PseudoAngle(d) - from;
   return angle < 0 ? angle + 4 : angle;

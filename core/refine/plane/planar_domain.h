@@ -23,7 +23,7 @@
 
 namespace wellspace::core {
 
-// What is rounded of a place, relative to its coordinates: not little beside a segment that is short.
+// The rounding of a place, relative to its coordinates: not little beside a segment that is short.
 inline constexpr double kPlaceRounding = 0x1p-50;
 
 // The squared circumradius of an equilateral triangle of area 1.
@@ -75,7 +75,7 @@ class PlanarDomain {
   // Points beside a segment.
 
   // Where `p` is beside a segment: how far along from its end a the foot is, on the line through it, and how far away,
-  // with a sign. Units: those of the coordinates.
+  // with a sign. Units: as of the coordinates.
   struct Foot {
     double from_a = 0;
     double away = 0;
@@ -156,14 +156,14 @@ class PlanarDomain {
   // The number of the sector at `v` that the direction `d` leads into, as of the way before it; one of the two, where
   // it leads along a segment. 0 for a vertex inside a face.
   size_t SectorToward(VertexId v, const Point<2>& d) const { return SectorToward(WaysFrom(v), d); }
-  // The same by the ways from a vertex.
+  // SectorToward by the ways from a vertex.
   size_t SectorToward(std::span<const HalfEdge> ways, const Point<2>& d) const;
   uint32_t FaceOfSector(VertexId v, size_t sector) const {
     const std::span<const HalfEdge> ways = WaysFrom(v);
     return ways.empty() ? FaceOf(v) : faces_.left_face[ways[sector]];
   }
 
-  // The vertices on each segment in their order, with both of its ends: those of segment s are
+  // The vertices on each segment in their order, with both of its ends: for segment s they are
   // vertices[first[s]] to vertices[first[s + 1]].
   struct Chains {
     std::vector<uint32_t> first;
@@ -193,7 +193,7 @@ class PlanarDomain {
   PlanarGraph graph_;
   PlanarFaces faces_;
   std::vector<double> lengths_;  // by segment
-  std::vector<HalfEdge> ways_;   // 2 of each segment: those from a vertex on it, toward b and a
+  std::vector<HalfEdge> ways_;   // 2 of each segment: pieces from a vertex on it, toward b and a
   double min_angle_ = std::numbers::pi;
   std::vector<bool> has_small_angle_;          // by half-edge
   std::vector<std::atomic<uint32_t>> splits_;  // by segment

@@ -1,4 +1,4 @@
-// A domain in the plane as the refinement takes it: what BoxDomain is for a cloud.
+// A domain in the plane as the refinement takes it, as BoxDomain is for a cloud.
 #ifndef WELLSPACE_CORE_REFINE_PLANE_PLANE_DOMAIN_H_
 #define WELLSPACE_CORE_REFINE_PLANE_PLANE_DOMAIN_H_
 
@@ -18,8 +18,8 @@
 
 namespace wellspace::core {
 
-// A handle of a PlanarDomain, which has segments, faces, and the places of vertices; box_domain.h says what the names
-// are.
+// A handle of a PlanarDomain, which has segments, faces, and the places of vertices; box_domain.h explains the names
+// below.
 //
 // Thread safety: as PlanarDomain.
 class PlaneDomain {

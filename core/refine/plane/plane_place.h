@@ -21,8 +21,8 @@ struct SegmentPoint {
   bool IsOnSegment() const { return segment != kNone; }
 };
 
-// What the distance of a place on a segment depends on, beside the vertices near to it. RoundPlace notes it, and
-// AreSplitsInOrder asks of a recorded request whether it still is so.
+// The data that the distance of a place on a segment depends on, beside the vertices near to it. RoundPlace notes it,
+// and AreSplitsInOrder asks of a recorded request whether it still is so.
 enum class SplitOrder : uint8_t {
   kAny,            // nothing
   kFirst,          // no vertex has been inserted on the segment

@@ -35,7 +35,7 @@ class FacesAround {
     are_equal_ = std::all_of(ways_.begin(), ways_.end(), [&](HalfEdge h) { return left_face[h] == first_; });
   }
 
-  // That of the sector which `d` leads into.
+  // The face of the sector which `d` leads into.
   uint32_t Toward(const Point<2>& d) const {
     return are_equal_ ? first_ : domain_.faces().left_face[ways_[domain_.SectorToward(ways_, d)]];
   }
@@ -75,7 +75,7 @@ bool PlaneRules::IsAcross(VertexId v, VertexId u, const Point<2>& toward) const 
   return false;
 }
 
-// The same with the end of `segment`, which v is on, as the common one.
+// IsAcross with the end of `segment`, which v is on, as the common end.
 bool PlaneRules::IsAcrossFrom(uint32_t segment, bool is_b, VertexId v, VertexId u, const Point<2>& toward) const {
   const VertexId apex = domain().EndVertex(segment, is_b);
   if (apex == v || apex == u) {
@@ -105,7 +105,7 @@ bool PlaneRules::IsAcrossFrom(uint32_t segment, bool is_b, VertexId v, VertexId 
   return false;
 }
 
-// Whether an own segment of `v` lies between the generators of a node: it is not yet what it will be, and no triangle
+// Whether an own segment of `v` lies between the generators of a node: the node is not final yet, and no triangle
 // lies there.
 bool PlaneRules::IsCrossed(VertexId v, const NodeView& node) const {
   if (!node.IsTriangle()) {
@@ -267,8 +267,8 @@ PlaneRules::Answer PlaneRules::NextRequest(VertexId v, const Polytope<2>& cell, 
   if (found.met.IsThere()) {  // rule 1
     answer.request = RequestAt(v, SplitPlace(visible_, v, found.met), edge_limit_sq, workspace);
     if (!rules_.IsLongEnough(answer.request->point)) {
-      // Two vertices at one distance from the end of a tiny angle: either is in the disc of the other's segment by what
-      // is rounded. MakeConforming has the last word.
+      // Two vertices at one distance from the end of a tiny angle: either is in the disc of the other's segment by
+      // rounding. PlaneMesher::Conform has the last word.
       answer.request.reset();
       answer.passed_segment = found.met.segment;
     }

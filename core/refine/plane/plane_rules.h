@@ -1,4 +1,4 @@
-// The rules of refinement in a domain of the plane: what is wrong with a cell, which segment is to be split, and where
+// The rules of refinement in a domain of the plane: the faults of a cell, the segment to be split, and where
 // a new vertex goes. PlaneSteps asks them in each step of a vertex, for the loop and for the threads that speculate.
 #ifndef WELLSPACE_CORE_REFINE_PLANE_PLANE_RULES_H_
 #define WELLSPACE_CORE_REFINE_PLANE_PLANE_RULES_H_
@@ -25,12 +25,12 @@
 
 namespace wellspace::core {
 
-// What is wrong with a cell in a domain. The loop and the records see what every cell has; the part is for the request.
+// The faults of a cell in a domain. The loop and the records see the base alone; the part is for the request.
 struct PlaneAssessment : Assessment {
   MetPart met;  // there if is_segment_encroached
 };
 
-// What a cell has asked for in vain: no place for a vertex was far enough from others. It asks no more for it.
+// The requests that a cell has made in vain: no place for a vertex was far enough from others. It asks no more for it.
 struct PassedOver {
   std::vector<NodeName> nodes;
   std::vector<uint32_t> segments;  // that it meets
@@ -43,11 +43,11 @@ struct PassedOver {
 //      near to a segment or beyond one, its foot there (YieldPlace, RoundPlace). Where the foot would come too near at
 //      a small angle, the node is refused.
 //   3. Nothing: the vertex is done, or looked at later.
-// What is refused or passed over is left out when the cell is looked at again.
+// Refused nodes, and those passed over, are left out when the cell is looked at again.
 // These nodes do not count: one in a face that is not meshed; one between whose generators an own segment lies
 // (IsCrossed), which is only remembered; by rho, one whose triangle is across (IsAcross); one that was refused.
 //
-// For the criteria of one run. What the functions return depends on the cell, on the places of vertices and on the
+// For the criteria of one run. Their results depend on the cell, on the places of vertices and on the
 // domain alone: not on the leaves of the tree, which are split while others speculate.
 //
 // Thread safety: thread-compatible; const functions may run at once, and, with expected vertices, beside
@@ -71,15 +71,15 @@ class PlaneRules {
   // Complexity: that of a query.
   double NearestFeatureSq(VertexId v, double limit_sq, Workspace<2>& workspace) const;
 
-  // What is wrong with the cell of `v`, whose nodes are placed unless it is plainly good; `segments` has all that meet
-  // it. What a cell is beyond the segments of v, on sides that are not meshed, does not count. What is in `passed_over`
-  // asks for nothing.
+  // The faults of the cell of `v`, whose nodes are placed unless it is plainly good; `segments` has all that meet
+  // it. The part of a cell beyond the segments of v, on sides that are not meshed, does not count. Nodes and segments
+  // in `passed_over` ask for nothing.
   //
   // Complexity: O(nodes segments).
   PlaneAssessment AssessCell(VertexId v, Polytope<2>& cell, std::span<const uint32_t> segments, double edge_limit_sq,
                              const PassedOver& passed_over) const;
 
-  // The insertion that `cell`, that of `v`, asks for by what was found; or the node or segment that is to be passed
+  // The insertion that `cell`, that of `v`, asks for by its assessment; or the node or segment that is to be passed
   // over, after which the cell has to be assessed again; none of these if nothing is asked for. `segments` as in
   // AssessCell; cell_of computes cells in `workspace`.
   //
@@ -103,13 +103,13 @@ class PlaneRules {
   const QueryStructure<2>& structure() const { return visible_.structure(); }
   const PlanarDomain& domain() const { return visible_.domain(); }
 
-  // Which nodes count, and by which bound.
+  // The nodes that count, and their bounds.
   bool IsAcross(VertexId v, VertexId u, const Point<2>& toward) const;
   bool IsAcrossFrom(uint32_t segment, bool is_b, VertexId v, VertexId u, const Point<2>& toward) const;
   bool IsCrossed(VertexId v, const NodeView& node) const;
   Bound BoundOf(const Polytope<2>& cell, const CellNode<2>& node, const NodeView& view, uint32_t face) const;
 
-  // What is inserted for a node that counts.
+  // The insertion for a node that counts.
   bool IsAtSegment(VertexId v, const NodeView& node) const;
   SteinerPoint<2> CandidateIn(size_t sector, VertexId v, const Polytope<2>& cell, std::span<const uint32_t> segments,
                               const Assessment& found, bool is_at_segment, double edge_limit_sq,

@@ -1,4 +1,4 @@
-// The steps of one vertex in a domain of the plane, computed from its cell: what CellSteps is in the box. Made by
+// The steps of one vertex in a domain of the plane, computed from its cell, as CellSteps are in the box. Made by
 // Refinement::RefineByCell for the loop, and by Rounds::Record to be recorded.
 #ifndef WELLSPACE_CORE_REFINE_PLANE_PLANE_STEPS_H_
 #define WELLSPACE_CORE_REFINE_PLANE_PLANE_STEPS_H_
@@ -24,7 +24,7 @@ namespace wellspace::core {
 
 // As CellSteps, whose functions it has; segments take the place of faces of the box. Two things differ:
 // - A node or a segment may be passed over by the rules. Then the cell is assessed again, without it, before the next
-//   request is looked for; what was found before no longer holds (Reassessed).
+//   request is looked for; earlier findings no longer hold (Reassessed).
 // - All neighbours get a notice, and no nodes are watched.
 //
 // Thread safety: as CellSteps.

@@ -11,7 +11,7 @@
 namespace wellspace::core {
 namespace {
 
-// A round distance differs from what it stands for by at most this times the empty radius.
+// A round distance differs from the exact one by at most this times the empty radius.
 constexpr double kRoundingShare = 0.3;
 
 // The multiple of the largest power of two that lies within `room` of `distance`.

@@ -14,12 +14,12 @@
 
 namespace wellspace::core {
 
-// Distances from a common end that differ by less than this, relatively, are equal: those of segments that are given
+// Distances from a common end that differ by less than this, relatively, are equal: lengths of segments that are given
 // are rounded.
 inline constexpr double kSameDistance = 1e-9;
 
 // Where a vertex is to split `met`, which the cell of `v` meets. In this order:
-//   1. v is on a segment that makes an angle below 90 degrees with the one that is met: at the distance of v from the
+//   1. v is on a segment that makes an angle below 90 degrees with `met`: at the distance of v from the
 //      common end, so that no new distance comes into being, and small angles end.
 //   2. Else at the foot of v, as far as that is in the part, by RoundPlace.
 //

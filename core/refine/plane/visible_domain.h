@@ -27,7 +27,7 @@ class VisibleDomain {
   VisibleDomain(const QueryStructure<2>& structure, const PlanarDomain& domain, const ExpectedVertices* expected)
       : structure_(structure), domain_(domain), expected_(expected) {}
 
-  // What is never expected: segments, faces, and vertices that cells are looked at of.
+  // Never expected are segments, faces, and vertices that cells are looked at of.
   const QueryStructure<2>& structure() const { return structure_; }
   const PlanarDomain& domain() const { return domain_; }
 

@@ -16,10 +16,10 @@ Point<3> MeetingPoint(const Triangle& triangle, Point<3> a, Point<3> b) {
   if (b < a) {
     std::swap(a, b);
   }
-  const Point<3> normal = Cross(Difference<3>(triangle[1], triangle[0]), Difference<3>(triangle[2], triangle[0]));
+  const Point<3> normal = NormalOf(triangle);
   const double of_a = Dot<3>(normal, Difference<3>(a, triangle[0]));
   const double of_b = Dot<3>(normal, Difference<3>(b, triangle[0]));
-  // They have different signs but for what is rounded; both are 0 where the edge lies in the plane.
+  // They have different signs, up to rounding; both are 0 where the edge lies in the plane.
   const double share = of_a == of_b ? 0.5 : std::clamp(of_a / (of_a - of_b), 0.0, 1.0);
   Point<3> at;
   for (int axis = 0; axis < 3; ++axis) {
@@ -32,9 +32,22 @@ Point<3> MeetingPoint(const Triangle& triangle, Point<3> a, Point<3> b) {
 
 void EdgeCrossings::Find(const Point<3>& a, const Point<3>& b, IndexNode from) {
   index_.FindCrossings(a, b, found_, from);
+  TakeFound(a, b);
+}
+
+void EdgeCrossings::FindAmong(const Point<3>& a, const Point<3>& b, std::span<const uint32_t> triangles) {
+  if (triangles.empty()) {  // as of most edges
+    all_.clear();
+    return;
+  }
+  index_.FindCrossingsAmong(a, b, triangles, found_);
+  TakeFound(a, b);
+}
+
+void EdgeCrossings::TakeFound(const Point<3>& a, const Point<3>& b) {
   all_.clear();
   for (const SurfaceCrossing& crossing : found_) {
-    all_.push_back({.at = MeetingPoint(index_.TriangleAt(crossing.triangle), a, b),
+    all_.push_back({.at = MeetingPoint(InOrder(index_.TriangleAt(crossing.triangle)), a, b),
                     .triangle = crossing.triangle,
                     .patch = patch_of_[crossing.triangle],
                     .before = index_.solids().solid_of[crossing.before],

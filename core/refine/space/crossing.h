@@ -1,4 +1,4 @@
-// Where an edge of a cell crosses the surface: what a domain in space asks of a facet of the mesh begins with it.
+// The crossings of an edge of a cell and the surface, with which the assessment of a facet in space begins.
 #ifndef WELLSPACE_CORE_REFINE_SPACE_CROSSING_H_
 #define WELLSPACE_CORE_REFINE_SPACE_CROSSING_H_
 
@@ -16,7 +16,7 @@ struct Crossing {
   uint32_t triangle = 0;
   uint32_t patch = 0;
   uint32_t before = 0;  // the solid that the edge comes from
-  uint32_t beyond = 0;  // the one that it goes on in; the same at a membrane
+  uint32_t beyond = 0;  // the solid that it goes on in; the same at a membrane
 
   bool operator==(const Crossing&) const = default;
 };
@@ -37,6 +37,9 @@ class EdgeCrossings {
   // Complexity: O(nodes of the index that the edge meets, and their triangles); no allocation once warm.
   void Find(const Point<3>& a, const Point<3>& b, IndexNode from = 0);
 
+  // Find, where it is known that of all triangles none but these are crossed, ascending.
+  void FindAmong(const Point<3>& a, const Point<3>& b, std::span<const uint32_t> triangles);
+
   // In the order from a to b.
   const std::vector<Crossing>& all() const { return all_; }
 
@@ -48,6 +51,8 @@ class EdgeCrossings {
   const Crossing* NearestTo(const Point<3>& v) const;
 
  private:
+  void TakeFound(const Point<3>& a, const Point<3>& b);
+
   const SurfaceIndex& index_;
   const std::span<const uint32_t> patch_of_;
   std::vector<SurfaceCrossing> found_;

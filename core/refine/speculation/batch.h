@@ -1,4 +1,4 @@
-// Vertices that are refined one after the other, and what has become of the steps recorded for them: ADR 23.
+// Vertices that are refined one after the other, and the use made of the steps recorded for them: ADR 23.
 #ifndef WELLSPACE_CORE_REFINE_SPECULATION_BATCH_H_
 #define WELLSPACE_CORE_REFINE_SPECULATION_BATCH_H_
 
@@ -20,9 +20,9 @@ namespace wellspace::core {
 // The life of a batch, which Rounds calls for unless it says otherwise:
 //   1. It gets the next vertices of its strip (TakeNext).
 //   2. Prepare; then other threads record vertex after vertex: BatchRecords::Begin, the columns, AppendStar, SetKnown.
-//   3. BeginReplay notes as conflicts what has been inserted since step 2.
+//   3. BeginReplay notes the vertices that have been inserted since step 2 as conflicts.
 //   4. Refinement::RefineBatch takes its vertices in order. If a record IsStillValid it is replayed, else the steps are
-//      computed; what has been inserted then is compared to what was expected (NoteInserted).
+//      computed; inserted vertices are compared to the expected ones (NoteInserted).
 // A batch that was not speculated on skips steps 2 and 3, and has no record that is valid.
 //
 // A record is still valid if no vertex conflicts with it. Vertices conflict that could cut the cells it was computed
@@ -40,14 +40,14 @@ struct alignas(kCacheLines) Batch {
   // Whether the whole strip has been refined.
   bool IsLast() const { return IsRefined() && strip_begin == strip_end; }
 
-  // Forgets what was recorded; `vertices_now` are in the structure, and so many have been inserted in these rounds.
+  // Forgets the records; `vertices_now` are in the structure, and so many have been inserted in these rounds.
   void Prepare(uint32_t vertices_now, size_t inserted_now) {
     records.Clear(vertices.size(), vertices_now);
     conflicts.clear();
     first_unknown = inserted_now;
   }
 
-  // Begins to replay what was recorded, if anything was; `points` have been inserted since.
+  // Begins to replay the records, if there are any; `points` have been inserted since.
   void BeginReplay(std::span<const Point<D>> points) {
     numbers.assign(records.inserted.size(), kNoVertex);
     NoteConflicts(points);
@@ -70,7 +70,7 @@ struct alignas(kCacheLines) Batch {
     }
   }
 
-  // Compares what has been inserted for the next vertex, numbered from `first` on, to what was expected. A point that
+  // Compares the points inserted for the next vertex, numbered from `first` on, to the expected ones. A point that
   // was expected conflicts with no record, even if the record of this vertex was not valid.
   void NoteInserted(std::span<const Point<D>> points, VertexId first) {
     const std::span<const Point<D>> expected = records.ExpectedOf(refined);
@@ -99,13 +99,13 @@ struct alignas(kCacheLines) Batch {
   size_t strip_begin = 0;
   size_t strip_end = 0;
   std::vector<VertexId> vertices;
-  size_t refined = 0;  // so many of the vertices, the first
+  size_t refined = 0;  // the number of vertices that are refined, the first ones
 
   BatchRecords<Domain> records;
   Star<D> written;           // simplices of the batch before, which may still be read
-  size_t first_unknown = 0;  // of what is inserted in these rounds, the first that the records were made without
+  size_t first_unknown = 0;  // of the insertions in these rounds, the first that the records were made without
 
-  // What has become of the requests.
+  // The outcome of the requests.
   std::vector<VertexId> numbers;    // by request, in the structure; kNoVertex if it has not been inserted
   std::vector<Point<D>> conflicts;  // the points within reach
 };

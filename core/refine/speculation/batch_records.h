@@ -23,19 +23,19 @@
 
 namespace wellspace::core {
 
-// What is found of a cell between two insertions for it.
+// The findings of a cell between two insertions for it.
 struct RecordedStep {
   Assessment found;
-  uint32_t notices = 0;        // so many, the next of the batch's
+  uint32_t notices = 0;        // their number, the next of the batch's
   bool asks = false;           // for the next of the batch's requests; if not, it is the last step of its vertex
-  bool is_reassessed = false;  // what is found has become the next of the batch's while a request was looked for
+  bool is_reassessed = false;  // the findings have become the next of the batch's while a request was looked for
 };
 
-// Steps in columns, vertex after vertex, recorded as if no vertices were refined meanwhile but those of the batch. What
-// would be inserted has provisional numbers: from the vertices of the structure on, as many as there were then.
+// Steps in columns, vertex after vertex, recorded as if no vertices were refined meanwhile but those of the batch. New
+// vertices have provisional numbers: from the vertices of the structure on, as many as there were then.
 //
 // Thread safety: thread-compatible. From Rounds::Prepare until `is_speculated` it belongs to the threads that record,
-// which write nothing else of a batch; before and after that to the one that refines.
+// which write nothing else of a batch; before and after that to the thread that refines.
 template <typename Domain>
 struct BatchRecords {
   static constexpr int D = Domain::kDimension;
@@ -50,7 +50,7 @@ struct BatchRecords {
     uint32_t watched = 0;
     uint32_t simplices = 0;
   };
-  // What is recorded of one vertex.
+  // The record of one vertex.
   struct Record {
     bool is_wanted = false;      // the vertex was pending
     bool has_to_notify = false;  // some of its neighbours have not been told that it was added
@@ -75,7 +75,7 @@ struct BatchRecords {
     simplices.resize(ends.simplices);
   }
 
-  // Forgets what was recorded, and has room for so many vertices; `vertices_now` are in the structure.
+  // Forgets all records, and has room for `vertices` of them; `vertices_now` are in the structure.
   void Clear(size_t vertices, uint32_t vertices_now) {
     CutTo({});
     inserted.Clear(VertexId{vertices_now});
@@ -104,7 +104,7 @@ struct BatchRecords {
   // Ends the record of vertex `at`, at `site`: all its steps are there.
   void SetKnown(size_t at, const Point<D>& site) {
     by_vertex[at].is_known = true;
-    const double radius = 1.001 * std::sqrt(by_vertex[at].reach_sq);  // more than what is rounded
+    const double radius = 1.001 * std::sqrt(by_vertex[at].reach_sq);  // more than rounding
     reach.Include(CubeAround<D>(site, radius));
   }
 
@@ -114,13 +114,13 @@ struct BatchRecords {
   // Where the record of vertex `at` ends, once all are made.
   Ends EndOf(size_t at) const { return at + 1 < by_vertex.size() ? by_vertex[at + 1].begin : ends(); }
 
-  // What the record of vertex `at` asks for.
+  // The requests in the record of vertex `at`.
   std::span<const Request> RequestsOf(size_t at) const {
     const uint32_t begin = by_vertex[at].begin.requests;
     return std::span(requests).subspan(begin, EndOf(at).requests - begin);
   }
 
-  // What is expected to be inserted for vertex `at`.
+  // The vertices expected to be inserted for vertex `at`.
   std::span<const Point<D>> ExpectedOf(size_t at) const {
     if (!IsKnown(at)) {
       return {};
@@ -140,7 +140,7 @@ struct BatchRecords {
   // Rounds::NextBatch loads it with acquire while others may record. All else that reads or writes it runs when they do
   // not, or after that load.
   bool is_speculated = false;
-  // Of the parts that records are made in. Rounds::RecordPart loads it with acquire, to wait for the part before its
+  // The number of parts that are recorded. Rounds::RecordPart loads it with acquire, to wait for the part before its
   // own, and stores it with release once its own is done.
   size_t parts_done = 0;
 

@@ -1,4 +1,4 @@
-// The steps of one vertex, replayed from what a thread has recorded. Made by Refinement::RefineNextOf for a vertex
+// The steps of one vertex, replayed from the record of a thread. Made by Refinement::RefineNextOf for a vertex
 // whose record is still valid; no cell is computed.
 #ifndef WELLSPACE_CORE_REFINE_SPECULATION_RECORDED_STEPS_H_
 #define WELLSPACE_CORE_REFINE_SPECULATION_RECORDED_STEPS_H_

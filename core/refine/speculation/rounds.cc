@@ -13,6 +13,7 @@
 #include "core/refine/box_domain.h"
 #include "core/refine/plane/plane_domain.h"
 #include "core/refine/rounding.h"
+#include "core/refine/space/space_domain.h"
 
 namespace wellspace::core {
 namespace {
@@ -207,7 +208,7 @@ Batch<Domain>* Rounds<Domain>::NextBatch() {
 }
 
 // In small buckets, and where there are few blocks, batches that are refined at about the same time may be near each
-// other, so that many records conflict: there it is not worth while. What queries read does not change until
+// other, so that many records conflict: there it is not worth while. The data of queries does not change until
 // CommitAdded.
 template <typename Domain>
 void Rounds<Domain>::Speculate() {
@@ -282,7 +283,7 @@ void Rounds<Domain>::RecordPart(Batch<Domain>& batch, size_t part, size_t parts,
 }
 
 // Records the steps of vertex `at`: the loop of Refinement::RefineVertex, but each step is recorded in the place of
-// being done. Returns before the last step, and the record is not known, where that is an error, or depends on what is.
+// being done. Returns before the last step, and the record is not known, if that step is an error or depends on one.
 template <typename Domain>
 void Rounds<Domain>::Record(Batch<Domain>& batch, size_t at, StepWorkspace<D>& workspace) const {
   const VertexId v = batch.vertices[at];
@@ -345,7 +346,7 @@ void Rounds<Domain>::EndRound() {
   }
   stars_.BeginWriting(*team_);
   structure_.CommitAll();
-  // The records of the next batches may have been made without what has been inserted meanwhile.
+  // The records of the next batches may have been made without the insertions meanwhile.
   const Batch<Domain>& next = HalfOf(1).front();
   const size_t is_known = next.records.is_speculated ? next.first_unknown - inserted_before_ : inserted_.size();
   inserted_.erase(inserted_.begin(), inserted_.begin() + static_cast<std::ptrdiff_t>(is_known));
@@ -417,5 +418,6 @@ uint64_t Rounds<Domain>::CountBytes() const {
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE
 template class Rounds<PlaneDomain>;
+template class Rounds<SpaceDomain>;
 
 }  // namespace wellspace::core

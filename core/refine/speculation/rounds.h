@@ -1,4 +1,4 @@
-// A bucket's vertices in rounds: while those of one round are refined, threads speculate on those of the next. ADR 23.
+// A bucket's vertices in rounds: while one round is refined, threads speculate on the vertices of the next. ADR 23.
 #ifndef WELLSPACE_CORE_REFINE_SPECULATION_ROUNDS_H_
 #define WELLSPACE_CORE_REFINE_SPECULATION_ROUNDS_H_
 
@@ -32,7 +32,7 @@ struct SpeculationCounts {
 // vertices on a structure that is not changed meanwhile: vertices that are added stay uncommitted until no thread
 // speculates any more.
 //
-// All decisions are those of the calling thread, so that the mesh does not depend on what other threads do, or when.
+// The calling thread alone decides, so that the mesh does not depend on the work of other threads, or on its timing.
 //
 //   if (rounds.Begin(bucket))
 //     while (!rounds.AreDone()) {
@@ -42,9 +42,9 @@ struct SpeculationCounts {
 //       rounds.NextRound();
 //     }
 //
-// What a call may find, and what it leaves; a dash where that stays. A bucket is detached, or none is. Others record
-// (IsRecording), or not. Stars are written at once, collected (StarWriter::NeedsStars), or written by another thread
-// (StarWriter::IsWriting), which may go on while stars are collected.
+// The state that a call may find, and the state that it leaves; a dash where that stays. A bucket is detached, or none
+// is. Others record (IsRecording), or not. Stars are written at once, collected (StarWriter::NeedsStars), or written by
+// another thread (StarWriter::IsWriting), which may go on while stars are collected.
 //
 //   function       before                                   after
 //                  detached  recording  stars               detached  recording  stars
@@ -82,9 +82,9 @@ class Rounds {
   // Begins a run, which speculates with the threads of `team`. EndRun or DropRun has to be called before one of these
   // goes; DropRun may be called after EndRun, and does nothing then.
   void BeginRun(const StepRules<D>& rules, ThreadTeam& team, const RunContext& context);
-  // Writes the stars that are left, and adds to `counters` what the queries of other threads have cost.
+  // Writes the stars that are left, and adds the cost of the queries of other threads to `counters`.
   void EndRun(QueryCounters& counters);
-  // Ends a run in which something has been thrown.
+  // Ends a run in which an exception has been thrown.
   void DropRun();
 
   // Detaches the vertices of `bucket`, the lowest; false if there are too few, and they stay where they are.
@@ -93,10 +93,10 @@ class Rounds {
   void ReattachAll();
   // Whether no vertex is detached any more.
   bool AreDone() const { return batches_.empty(); }
-  // Of the detached vertices.
+  // The bucket of the detached vertices.
   int bucket() const { return bucket_; }
 
-  // Forgets what was recorded in a run that has been stopped.
+  // Forgets the records of a run that has been stopped.
   void ForgetRecords();
   // Has other threads speculate on the batches of the next round, unless few records were valid of late. The batches of
   // this round have been speculated on by then.
@@ -104,14 +104,14 @@ class Rounds {
   // The next batch to be refined; null at the end of the round. Where other threads are at the last of the next round,
   // its first batches come, too.
   Batch<Domain>* NextBatch();
-  // Ends the speculation, commits what was added, and has another thread write stars.
+  // Ends the speculation, commits the added vertices, and has another thread write stars.
   void EndRound();
   // Goes on to the next round, with new batches in the place of those that have been refined.
   void NextRound();
 
   // Begins to refine `batch`.
   void BeginBatch(Batch<Domain>& batch);
-  // Asks the memory for what refining the next vertices of `batch` reads.
+  // Asks the memory for the data that refining the next vertices of `batch` reads.
   void Prefetch(const Batch<Domain>& batch) const;
   // Notes that a vertex has been added at `p`.
   void NoteInserted(const Point<D>& p) {
@@ -129,17 +129,17 @@ class Rounds {
     counts_.speculated += batch.records.is_speculated ? 1 : 0;
     counts_.replayed += was_valid ? 1 : 0;
   }
-  // Of all runs.
+  // The counts of all runs.
   const SpeculationCounts& counts() const { return counts_; }
 
   // Whether other threads may speculate.
   bool IsRecording() const { return is_recording_; }
-  // Returns when other threads have done what was begun.
+  // Returns when other threads have ended the calls that were begun.
   void AwaitOthers();
-  // Has queries find all vertices that have been added, once other threads have done what was begun.
+  // Has queries find all vertices that have been added, once other threads have ended the calls that were begun.
   void CommitAdded();
 
-  // Of what a round needs; roughly.
+  // The memory of a round; roughly. Unit: bytes.
   uint64_t MemoryBytes() const { return is_recording_ ? bytes_before_ : CountBytes(); }
 
  private:
@@ -159,7 +159,7 @@ class Rounds {
   PendingVertices<D>& pending_;
   StarWriter<D>& stars_;
 
-  // Of the detached vertices.
+  // State of the detached vertices.
   int bucket_ = -1;
   HugeVector<VertexId> detached_;        // the last of each strip is the next
   std::vector<Batch<Domain>> batches_;   // by strip, the next of each; none if no vertex is detached
@@ -173,14 +173,14 @@ class Rounds {
   size_t distrusted_size_ = 0;   // of the last bucket where too few were; 0 if none
   SpeculationCounts counts_;
 
-  // Of the run.
+  // State of the run.
   const StepRules<D>* rules_ = nullptr;
   ThreadTeam* team_ = nullptr;  // null between runs
   const RunContext* context_ = nullptr;
   std::vector<StepWorkspace<D>> workspaces_;  // by thread
   bool is_recording_ = false;
-  bool notes_insertions_ = false;  // this round has been speculated on, so that what is inserted may conflict
-  uint64_t bytes_before_ = 0;      // of what other threads write, before they began
+  bool notes_insertions_ = false;  // this round has been speculated on, so that insertions may conflict
+  uint64_t bytes_before_ = 0;      // of the arrays that other threads write, before they began
 };
 
 }  // namespace wellspace::core

@@ -1,4 +1,4 @@
-// What the calls that take a cloud have in common, whatever they do with it.
+// The common part of calls that take a cloud: they receive it, and queue a job.
 #ifndef WELLSPACE_SERVER_SERVICES_MESHING_CLOUD_CALL_H_
 #define WELLSPACE_SERVER_SERVICES_MESHING_CLOUD_CALL_H_
 
@@ -22,7 +22,7 @@
 
 namespace wellspace::server {
 
-// A Call whose requests go to a CloudReceiver; at their end a job is queued; what becomes of its result is up to the
+// A Call whose requests go to a CloudReceiver; at their end a job is queued; the use of its result is up to the
 // class that derives from this. `Reactor` is gRPC's, for the kind of stream that answers; it reads bytes, which are
 // `Request`s.
 //
@@ -33,12 +33,12 @@ class CloudCall : public RequestStream<Call<Reactor>> {
   CloudCall(const CallEnvironment& environment, grpc::CallbackServerContext* context)
       : RequestStream<Call<Reactor>>(environment, context), receiver_(environment.options) {}
 
-  // On a worker: works, and hands over what came of it.
+  // On a worker: works, and hands over the result.
   virtual void Work(NumberChunks& points, Job& job) = 0;
 
   // The following are called with mutex_ held, and want it to be held when they are called.
 
-  // Whether what Work does with `points` takes about a second at most.
+  // Whether Work with `points` takes about a second at most.
   virtual bool IsSmall(const NumberChunks& points) const = 0;
   // The parameters have come, with `request`.
   virtual void OnParameters(const Request& /*request*/) {}

@@ -9,22 +9,33 @@ namespace wellspace::server {
 
 template <typename Request>
 absl::Status CloudReceiver::Accept(Request* request) {
+  FeaturePart part;
   switch (request->request_case()) {
     case Request::kParameters:
       return AcceptParameters(request->parameters());
     case Request::kPoints:
       return AcceptPoints(request->mutable_points());
     case Request::kSegments:
-      return AcceptSegments(request->segments());
+      part.mutable_segments()->Swap(request->mutable_segments());
+      return AcceptFeatures(part, "segments");
     case Request::kFaces:
-      return AcceptFaces(request->faces());
+      part.mutable_faces()->Swap(request->mutable_faces());
+      return AcceptFeatures(part, "faces");
+    case Request::kTriangles:
+      part.mutable_triangles()->Swap(request->mutable_triangles());
+      return AcceptFeatures(part, "triangles");
+    case Request::kSurface:
+      part.mutable_surface()->Swap(request->mutable_surface());
+      return AcceptFeatures(part, "surface");
     case Request::kSizeSamples:
       return AcceptSizes(request->mutable_size_samples());
     case Request::REQUEST_NOT_SET:
       break;
   }
-  return MakeError(v1::ERROR_REASON_EMPTY_REQUEST,
-                   "a request has neither parameters, points, segments, faces nor sizes; set one of them", "request");
+  return MakeError(
+      v1::ERROR_REASON_EMPTY_REQUEST,
+      "a request has neither parameters, points, segments, faces, triangles, surface nor sizes; set one of them",
+      "request");
 }
 
 template absl::Status CloudReceiver::Accept(v1::MeshPointsRequest*);
@@ -35,7 +46,7 @@ absl::Status CloudReceiver::AcceptEnd() {
     return MakeError(v1::ERROR_REASON_PARAMETERS_MISSING,
                      "the stream ended before any request; send the parameters first", "parameters");
   }
-  return ValidateFor(features_.View(), parameters_);
+  return ValidateFor(features_.InputOf({}), parameters_);
 }
 
 absl::Status CloudReceiver::AcceptParameters(const v1::MeshParameters& message) {
@@ -48,14 +59,6 @@ absl::Status CloudReceiver::AcceptParameters(const v1::MeshParameters& message) 
   return absl::OkStatus();
 }
 
-absl::Status CloudReceiver::CheckInDomain(const char* field) const {
-  if (!has_parameters_) {
-    return MakeError(v1::ERROR_REASON_PARAMETERS_MISSING,
-                     absl::StrCat(field, " came before the parameters; send the parameters first"), "parameters");
-  }
-  return parameters_.dimension == 2 ? absl::OkStatus() : NotInThePlane(field, parameters_.dimension);
-}
-
 absl::Status CloudReceiver::CheckCount(uint64_t count, const char* what) const {
   return count <= options_.max_points ? absl::OkStatus()
                                       : MakeError(v1::ERROR_REASON_TOO_MANY_POINTS,
@@ -63,21 +66,18 @@ absl::Status CloudReceiver::CheckCount(uint64_t count, const char* what) const {
                                                                "; this server accepts at most ", options_.max_points));
 }
 
-absl::Status CloudReceiver::AcceptSegments(const v1::SegmentChunk& chunk) {
-  const uint64_t first = features_.segment_count();
-  WELLSPACE_RETURN_IF_ERROR(CheckInDomain("segments"));
-  WELLSPACE_RETURN_IF_ERROR(CheckSegments(chunk, first));
-  WELLSPACE_RETURN_IF_ERROR(CheckCount(first + chunk.ends_size() / 2, "segments"));
-  features_.Append(chunk);
-  return absl::OkStatus();
-}
-
-absl::Status CloudReceiver::AcceptFaces(const v1::FaceOptions& options) {
-  const uint64_t first = features_.seed_count();
-  WELLSPACE_RETURN_IF_ERROR(CheckInDomain("faces"));
-  WELLSPACE_RETURN_IF_ERROR(CheckFaces(options, first));
-  WELLSPACE_RETURN_IF_ERROR(CheckCount(first + options.seeds_size(), "seeds"));
-  features_.Append(options);
+absl::Status CloudReceiver::AcceptFeatures(const FeaturePart& part, const char* field) {
+  if (!has_parameters_) {
+    return MakeError(v1::ERROR_REASON_PARAMETERS_MISSING,
+                     absl::StrCat(field, " came before the parameters; send the parameters first"), "parameters");
+  }
+  const FeatureCounts first = features_.counts();
+  WELLSPACE_RETURN_IF_ERROR(CheckFeatures(part, first, parameters_.dimension));
+  const FeatureCounts all = first + CountsOf(part);
+  WELLSPACE_RETURN_IF_ERROR(CheckCount(all.segments, "segments"));
+  WELLSPACE_RETURN_IF_ERROR(CheckCount(all.triangles, "triangles"));
+  WELLSPACE_RETURN_IF_ERROR(CheckCount(all.seeds, "seeds"));
+  features_.Append(part);
   return absl::OkStatus();
 }
 

@@ -16,7 +16,7 @@ void EstimateMeshCall::Work(NumberChunks& points, Job& job) {
   absl::Status status = RunGuarded([&] {
     const std::vector<double> coordinates = points.Flatten(job.context());
     WELLSPACE_ASSIGN_OR_RETURN(estimate,
-                               environment().estimator(parameters(), {coordinates, features().View()}, job.context()));
+                               environment().estimator(parameters(), features().InputOf(coordinates), job.context()));
     return absl::OkStatus();
   });
   std::lock_guard lock(mutex_);
@@ -34,7 +34,7 @@ void EstimateMeshCall::Work(NumberChunks& points, Job& job) {
 
 bool EstimateMeshCall::IsSmall(const NumberChunks& points) const {
   const int dimension = parameters().dimension;
-  return IsSmallEstimate(dimension, points.count() / dimension);
+  return IsSmallEstimate(dimension, points.count() / dimension + features().counts().triangles);
 }
 
 }  // namespace wellspace::server

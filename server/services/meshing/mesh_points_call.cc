@@ -17,7 +17,7 @@ void MeshPointsCall::Work(NumberChunks& points, Job& job) {
   absl::Status status = RunGuarded([&] {
     const std::vector<double> coordinates = points.Flatten(job.context());
     WELLSPACE_ASSIGN_OR_RETURN(core::Mesh made,
-                               environment().mesher(parameters(), {coordinates, features().View()}, job.context()));
+                               environment().mesher(parameters(), features().InputOf(coordinates), job.context()));
     mesh = std::make_shared<MeshChunks>(std::move(made));
     mesh->KeepMemory(job.TakeMemory(mesh->memory_bytes()));
     environment().observability.work().OnMesh(mesh->mesh().vertex_count(), mesh->mesh().simplex_count());
@@ -40,8 +40,9 @@ void MeshPointsCall::Work(NumberChunks& points, Job& job) {
 }
 
 bool MeshPointsCall::IsSmall(const NumberChunks& points) const {
-  return points.count() <= kMostSmallPoints * parameters().dimension &&
-         features().segment_count() <= kMostSmallPoints && IsSmallMesh(parameters(), points.Copy());
+  const FeatureCounts counts = features().counts();
+  return points.count() <= kMostSmallPoints * parameters().dimension && counts.segments <= kMostSmallPoints &&
+         counts.triangles == 0 && IsSmallMesh(parameters(), points.Copy());
 }
 
 void MeshPointsCall::ScheduleTick() {

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "server/base/version.h"
 #include "server/security/authenticator.h"
 #include "server/services/meshing/estimate_mesh_call.h"

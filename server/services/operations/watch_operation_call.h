@@ -17,7 +17,7 @@
 namespace wellspace::server {
 
 // Sends the events that the operation keeps and those to come, each when the one before is on its way, then the
-// operation. What a slow reader misses, the operation has forgotten: nothing is stored here.
+// operation. Events that a slow reader misses, the operation has forgotten: nothing is stored here.
 //
 // Thread safety and invariants: those of ResponseStream.
 class WatchOperationCall final

@@ -14,7 +14,7 @@
 namespace wellspace::server {
 namespace {
 
-// What one request asks for; outlives its call, for those that repeat it.
+// The contents of one request; they outlive its call, for calls that repeat it.
 struct Addition {
   SessionUse use;
   std::vector<double> points;
@@ -68,21 +68,29 @@ grpc::ServerUnaryReactor* AddVerticesCall::Serve(const CallEnvironment& environm
 }
 
 void AddVerticesCall::Submit(const IdentifiedRequest& identified, RequestIds::Done done) {
+  // Of a request with an id the records are asked whether another process has answered it, which may take a while.
+  const auto refuse = [&](const absl::Status& status) {
+    if (identified.request_id.empty() || !environment().session_log.is_durable()) {
+      done({status, ""});
+    } else {
+      environment().blocking.Run(request_->name(), [done, status] { done({status, ""}); });
+    }
+  };
   absl::StatusOr<std::shared_ptr<Session>> session = FindSession(environment(), caller(), request_->name());
   if (!session.ok()) {
-    done({std::move(session).status(), ""});
+    refuse(session.status());
     return;
   }
   const absl::StatusOr<uint64_t> expected_revision = ExpectedRevisionOf(*request_);
   if (!expected_revision.ok()) {
-    done({expected_revision.status(), ""});
+    refuse(expected_revision.status());
     return;
   }
   // The request as gRPC has it, and as the job does.
   const uint64_t bytes = 2 * (request_->points_size() * sizeof(double) + request_->near_size() * sizeof(uint32_t));
   absl::StatusOr<MemoryReservation> held = environment().memory.Reserve(bytes, "the vertices to be added");
   if (!held.ok()) {
-    done({std::move(held).status(), ""});
+    refuse(held.status());
     return;
   }
   const Session::Size size = (*session)->GetSize(0);
@@ -102,7 +110,7 @@ void AddVerticesCall::Submit(const IdentifiedRequest& identified, RequestIds::Do
                                    done(Add(*addition, create_mesher, running));
                                  }});
   if (!job.ok()) {
-    done({std::move(job).status(), ""});
+    refuse(job.status());
     return;
   }
   std::lock_guard lock(mutex_);

@@ -33,7 +33,7 @@ class AddVerticesCall final : public Call<grpc::ServerUnaryReactor> {
   void OnEnd() override;
   LogFields Figures() const override;
 
-  // Has the vertices added for `identified`, and `done` called with what came of it.
+  // Has the vertices added for `identified`, and `done` called with the outcome.
   void Submit(const IdentifiedRequest& identified, RequestIds::Done done);
   void EndWith(const RequestIds::Answer& answer);
 

@@ -9,7 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
-#include "core/mesh_locator.h"
+#include "core/mesh/mesh_locator.h"
 #include "core/simplex/locator.h"
 #include "server/services/resource_names.h"
 #include "server/services/session_fields.h"
@@ -21,7 +21,7 @@ namespace {
 // Of one call: its answer is then within the 4 MiB that clients of gRPC take.
 constexpr int kMostLocated = 32'768;
 
-// Refuses points that are no numbers. `offset`: what errors count from, here and below.
+// Refuses points that are no numbers. `offset`: the number from which errors count, here and below.
 absl::Status CheckFinite(std::span<const double> points, int dimension, uint64_t offset) {
   const auto wrong = std::ranges::find_if(points, [](double x) { return !std::isfinite(x); });
   if (wrong == points.end()) {

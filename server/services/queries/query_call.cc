@@ -9,7 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/time/time.h"
 #include "core/base/status_macros.h"
-#include "core/mesh_parameters.h"
+#include "core/input/mesh_parameters.h"
 #include "server/base/options.h"
 #include "server/jobs/job_size.h"
 #include "server/services/resource_names.h"
@@ -18,7 +18,7 @@
 namespace wellspace::server {
 namespace {
 
-// A batch is full when it has as many bytes: what one more look adds leaves it within kMaxResponseBytes, cells in 6-D
+// A batch is full when it has as many bytes: answers of one more look leave it within kMaxResponseBytes, cells in 6-D
 // excepted.
 constexpr uint64_t kFullBatchBytes = kMaxResponseBytes / 4 * 3;
 
@@ -99,7 +99,7 @@ void QueryCall::MakeBatches(Job& job) {
     if (ending()) {
       return;
     }
-    if (is_at_work) {  // what was filled stays
+    if (is_at_work) {  // the filled batches stay
       environment().log.debug("call={} waits for the structure", id());
       work_ = Work::kRefused;
       environment().background.PostAfter(kQueryRetryDelay, WeakCall(&QueryCall::TryAgain));

@@ -22,7 +22,7 @@ namespace wellspace::server {
 
 // Answers in batches of about kMaxResponseBytes, made by jobs. A job makes batches until kBatchesAhead wait to be
 // written, and another goes on when half of them are: a client that reads slowly takes no worker's time, and no more
-// memory than that. A job that finds the queue full comes again, unless it is the first: what was begun is not refused.
+// memory than that. A job that finds the queue full comes again, unless it is the first: begun work is not refused.
 //
 // All batches of an answer are of the same structure: once it changes the call ends with SESSION_BUSY or
 // REVISION_MISMATCH.

@@ -10,12 +10,12 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "grpcpp/support/byte_buffer.h"
 
 namespace wellspace::server {
 
-// What is asked of each vertex, and the batch of answers in the making.
+// A question that is asked of each vertex, and the batch of answers in the making.
 //
 // Thread safety: thread-compatible.
 class VertexQuery {

@@ -31,7 +31,7 @@ absl::Status DownloadMeshCall::Find() {
                      absl::StrCat(session->name(), " has no mesh yet; refine it first"));
   }
   mesh_ = std::move(mesh);
-  // The client has it, or what leads to it, from now on: what will differ from it is of use.
+  // The client has it, or differences that lead to it, from now on: those of later meshes from it are of use.
   session->deltas().NoteDownload(mesh_->revision());
   if (IsDelta()) {
     WELLSPACE_RETURN_IF_ERROR(FindDeltas(*session));
@@ -134,7 +134,7 @@ absl::StatusOr<grpc::ByteBuffer> DownloadMeshCall::MakeResponse() {
 LogFields DownloadMeshCall::Figures() const {
   LogFields figures;
   if (mesh_ != nullptr) {
-    figures.Add("session", request_.name()).Add("vertices", mesh_->figures().vertices).Add("chunks", sent_chunks_);
+    figures.Add("session", request_.name()).Add("vertices", mesh_->record().vertices()).Add("chunks", sent_chunks_);
     if (IsDelta()) {
       figures.Add("since", request_.since_revision()).Add("deltas", uint64_t{deltas_.size()});
     }

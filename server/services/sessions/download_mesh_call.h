@@ -18,7 +18,7 @@
 
 namespace wellspace::server {
 
-// Sends the mesh that the session has when the call begins, or what leads to it from one before, whatever becomes of
+// Sends the mesh that the session has when the call begins, or the differences that lead to it, whatever becomes of
 // the session.
 //
 // Thread safety and invariants: those of ResponseStream.
@@ -41,13 +41,13 @@ class DownloadMeshCall final
   absl::Status Find();
   // Finds the differences since request_.since_revision().
   absl::Status FindDeltas(const Session& session);
-  // Refuses what is continued if it is not the mesh, or the first difference, of this revision and with these chunks.
+  // Refuses to continue another mesh, or another first difference, than that of this revision and with these chunks.
   absl::Status CheckContinued(uint64_t revision, uint64_t chunks) const;
-  // Begins what comes next: the mesh, or the next difference.
+  // Begins the next part: the mesh, or the next difference.
   absl::Status BeginPart();
   // Whether chunks are those of a difference.
   bool IsDelta() const { return request_.since_revision() != 0; }
-  // Of what is sent now.
+  // Of the mesh, or the difference, that is sent now.
   absl::StatusOr<v1::MeshMetadata> Metadata() const;
   // The metadata, then the next chunk.
   absl::StatusOr<grpc::ByteBuffer> MakeResponse();

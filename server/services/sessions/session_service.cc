@@ -15,7 +15,7 @@
 #include "server/services/page_token.h"
 #include "server/services/resource_names.h"
 #include "server/services/session_fields.h"
-#include "server/services/sessions/add_segments_call.h"
+#include "server/services/sessions/add_features_call.h"
 #include "server/services/sessions/download_mesh_call.h"
 #include "server/services/sessions/set_sizes_call.h"
 #include "server/services/sessions/upload_points_call.h"
@@ -44,7 +44,7 @@ absl::Status Create(const CallEnvironment& environment, const Caller& caller, co
       .status();
 }
 
-// What the page tokens of a list of sessions depend on.
+// The name of the list that page tokens belong to: a token is refused where tenant or labels are others.
 std::string ListOf(const Caller& caller, const Labels& labels) {
   std::string list = absl::StrCat("sessions of ", caller.tenant);
   for (const auto& [key, value] : labels) {
@@ -207,6 +207,11 @@ grpc::ServerUnaryReactor* SessionService::RemovePoints(grpc::CallbackServerConte
 grpc::ServerReadReactor<grpc::ByteBuffer>* SessionService::AddSegments(grpc::CallbackServerContext* context,
                                                                        grpc::ByteBuffer* response) {
   return AddSegmentsCall::Begin(std::make_shared<AddSegmentsCall>(environment_, context, response));
+}
+
+grpc::ServerReadReactor<grpc::ByteBuffer>* SessionService::AddTriangles(grpc::CallbackServerContext* context,
+                                                                        grpc::ByteBuffer* response) {
+  return AddTrianglesCall::Begin(std::make_shared<AddTrianglesCall>(environment_, context, response));
 }
 
 grpc::ServerReadReactor<grpc::ByteBuffer>* SessionService::SetSizes(grpc::CallbackServerContext* context,

@@ -12,8 +12,9 @@ namespace wellspace::server {
 // Thread safety: thread-safe.
 class SessionService final
     : public v1::SessionService::WithRawCallbackMethod_UploadPoints<
-          v1::SessionService::WithRawCallbackMethod_AddSegments<v1::SessionService::WithRawCallbackMethod_SetSizes<
-              v1::SessionService::WithRawCallbackMethod_DownloadMesh<v1::SessionService::CallbackService>>>> {
+          v1::SessionService::WithRawCallbackMethod_AddSegments<
+              v1::SessionService::WithRawCallbackMethod_AddTriangles<v1::SessionService::WithRawCallbackMethod_SetSizes<
+                  v1::SessionService::WithRawCallbackMethod_DownloadMesh<v1::SessionService::CallbackService>>>>> {
  public:
   // REQUIRES:   `environment` outlives this.
   explicit SessionService(const CallEnvironment& environment) : environment_(environment) {}
@@ -34,6 +35,8 @@ class SessionService final
                                          v1::RemovePointsResponse* response) override;
   grpc::ServerReadReactor<grpc::ByteBuffer>* AddSegments(grpc::CallbackServerContext* context,
                                                          grpc::ByteBuffer* response) override;
+  grpc::ServerReadReactor<grpc::ByteBuffer>* AddTriangles(grpc::CallbackServerContext* context,
+                                                          grpc::ByteBuffer* response) override;
   grpc::ServerReadReactor<grpc::ByteBuffer>* SetSizes(grpc::CallbackServerContext* context,
                                                       grpc::ByteBuffer* response) override;
   grpc::ServerWriteReactor<grpc::ByteBuffer>* DownloadMesh(grpc::CallbackServerContext* context,

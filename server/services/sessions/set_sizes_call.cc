@@ -129,10 +129,10 @@ absl::Status SetSizesCall::FindPoints(SizeStore& sizes) {
                      absl::StrCat("vertex_sizes.mesh_revision is ", mesh_revision_, ", but the mesh of ",
                                   session.name(), " is of revision ", mesh->revision()));
   }
-  if (mesh->figures().vertices != sizes.count()) {
+  if (mesh->record().vertices() != sizes.count()) {
     return MakeError(v1::ERROR_REASON_INVALID_SIZES,
                      absl::StrCat("vertex_sizes.sizes: there are ", sizes.count(), ", but the mesh has ",
-                                  mesh->figures().vertices, " vertices; send one for each"),
+                                  mesh->record().vertices(), " vertices; send one for each"),
                      "vertex_sizes.sizes");
   }
   {

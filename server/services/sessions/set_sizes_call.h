@@ -9,9 +9,9 @@
 #include "grpcpp/support/server_callback.h"
 #include "server/calls/call.h"
 #include "server/calls/request_stream.h"
+#include "server/inputs/size_store.h"
 #include "server/jobs/memory_budget.h"
 #include "server/sessions/session_use.h"
-#include "server/sessions/size_store.h"
 #include "wellspace/v1/sessions.pb.h"
 
 namespace wellspace::server {
@@ -38,15 +38,15 @@ class SetSizesCall final : public RequestStream<Call<grpc::ServerReadReactor<grp
   // Takes the samples of the message in `bytes`. The first one says which session it is for.
   absl::Status Take(grpc::ByteBuffer* bytes);
   absl::Status TakeSamples(v1::SetSizesRequest& request);
-  // Sets memory aside for what has come and for the next message, which it then reads.
+  // Sets memory aside for the sizes that have come and for the next message, which it then reads.
   void ReserveAndRead();
-  // Sets memory aside for what has come, and for `more` bytes.
+  // Sets memory aside for the sizes that have come, and for `more` bytes.
   //
   // Errors:     MEMORY_LIMIT.
   absl::Status ReserveFor(uint64_t more);
 
   // Gives `sizes` to the session, on a thread that may wait for the disk. `of_vertices`: points are to be found. Until
-  // the session has them, what was set aside for them stays.
+  // the session has them, the memory that was set aside for them stays.
   absl::Status Set(SizeStore sizes, bool of_vertices);
   absl::Status FindPoints(SizeStore& sizes);
 

@@ -14,7 +14,7 @@
 namespace wellspace::server {
 namespace {
 
-// How often, and how many times, an upload looks whether the session is free: for a second.
+// The interval and the number of an upload's looks whether the session is free: a second in all.
 constexpr absl::Duration kUploadRetryDelay = absl::Milliseconds(50);
 constexpr int kAttempts = 20;
 
@@ -94,7 +94,7 @@ absl::Status UploadPointsCall::CheckPrefix(const v1::UploadPointsRequest& first)
 }
 
 void UploadPointsCall::Take(const v1::UploadPointsRequest& request) {
-  // What the call has committed has changed the revision.
+  // The revision is checked for the first message alone: later ones come after changes by this call's own commits.
   const uint64_t expected_revision = std::exchange(is_first_, false) ? request.expected_revision() : 0;
   const google::protobuf::RepeatedField<double>& coordinates = request.points().coordinates();
   Session& session = session_->session();
@@ -168,7 +168,7 @@ void UploadPointsCall::OnRequestsEnd() {
 void UploadPointsCall::OnEnd() {
   std::shared_ptr<UploadUse> upload = std::move(upload_);
   if (upload != nullptr && session_->session().UncommittedBytes() > 0) {
-    // What was received is committed, and only then another upload may go on.
+    // Received points are committed, and only then another upload may go on.
     environment().blocking.Run(session_->session().name(),
                                [self = SharedAs<UploadPointsCall>(), upload = std::move(upload)]() mutable {
                                  (void)RunGuarded([&] { return self->session_->session().CommitPoints(); });

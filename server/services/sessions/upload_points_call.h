@@ -17,7 +17,7 @@
 
 namespace wellspace::server {
 
-// Commits what has come whenever it is kCommittedBytes, and at its end; it goes on reading meanwhile. One upload has a
+// Commits points whenever they have kCommittedBytes, and at its end; it goes on reading meanwhile. One upload has a
 // session at a time: the first message of another waits for a moment, in which one whose connection broke is noticed.
 //
 // Thread safety and invariants: those of Call.
@@ -42,14 +42,14 @@ class UploadPointsCall final : public RequestStream<Call<grpc::ServerReadReactor
   absl::Status Parse(grpc::ByteBuffer* bytes, v1::UploadPointsRequest* request);
   // With first_: takes it when the session is free, or comes again, or ends the call.
   void TryToBegin();
-  // What the first message says that the session has.
+  // Checks the points that the first message says that the session has.
   absl::Status CheckPrefix(const v1::UploadPointsRequest& first) const;
   // Takes a message, and reads the next or ends the call.
   void Take(const v1::UploadPointsRequest& request);
-  // Begins a commit of what has come, if that is much and no other is under way; reads the next message unless too
+  // Begins a commit of received points, if they are many and no other is under way; reads the next message unless too
   // much waits for that.
   void GoOn();
-  // Has what has come committed on a thread that may wait, and `then` called with the outcome, with mutex_ held.
+  // Has the received points committed on a thread that may wait, and `then` called with the outcome, with mutex_ held.
   void Commit(void (UploadPointsCall::*then)(absl::Status));
   void OnCommitted(absl::Status status);
   void OnLastCommitted(absl::Status status);

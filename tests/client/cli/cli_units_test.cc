@@ -1,3 +1,4 @@
+// Small parts of the tool: numbers, progress, JSON, exit codes and summaries, against texts that were written by hand.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -12,7 +13,6 @@
 #include <vector>
 
 #include "absl/time/time.h"
-#include "client/cli/closest_word.h"
 #include "client/cli/exit_codes.h"
 #include "client/cli/helpful_threads.h"
 #include "client/cli/interrupt.h"
@@ -21,8 +21,9 @@
 #include "client/cli/options.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/statistics.h"
-#include "client/cli/time_left.h"
 #include "client/formats/io/output_file.h"
+#include "client/json/statistics.h"
+#include "client/time_left.h"
 #include "tests/support/temporary_folder.h"
 
 namespace wellspace::cli {
@@ -42,7 +43,7 @@ TEST(WithThousandsTest, GroupsByThree) {
 
 TEST(ProgressLineTest, ShowsPhaseFractionAndVerticesWithin79Columns) {
   const std::string line = ProgressLine("refinement", 0.5, "1,234,567 vertices");
-  EXPECT_EQ(line, "refinement [############------------]  50%  1,234,567 vertices");
+  EXPECT_EQ(line, "refinement [########--------]  50%  1,234,567 vertices");
   EXPECT_EQ(ProgressLine("refinement", 0.5, "1,234,567 vertices", "2 h 5 min"), line + ", 2 h 5 min left");
   for (const char* left : {"", "12 s"}) {
     const std::string longest = ProgressLine(std::string(100, 'x'), 7, std::string(100, '9') + " vertices", left);
@@ -62,9 +63,20 @@ TEST(ProgressLineTest, TakesAnyFraction) {
   EXPECT_EQ(ProgressLine("tree", 1e300, "0 vertices"), ProgressLine("tree", 1, "0 vertices"));
 }
 
+TEST(MeanRateTest, IsThatSinceTheFirstNote) {
+  const absl::Time start = absl::FromUnixSeconds(1'000'000);
+  client::MeanRate rate;
+  EXPECT_EQ(rate.At(100, start), std::nullopt);
+  EXPECT_EQ(rate.At(200, start + absl::Milliseconds(499)), std::nullopt);
+  EXPECT_EQ(rate.At(100, start + absl::Seconds(1)), std::nullopt);  // none came
+  EXPECT_EQ(rate.At(300, start + absl::Seconds(2)), 100);
+  EXPECT_EQ(rate.At(500, start + absl::Seconds(4)), 100);
+  EXPECT_EQ(rate.At(600, start - absl::Seconds(4)), std::nullopt);  // a clock that was set back
+}
+
 TEST(TimeLeftTest, IsThatOfTheMeanSpeed) {
   const absl::Time start = absl::UnixEpoch();
-  TimeLeft left;
+  client::TimeLeft left;
   EXPECT_EQ(left.At(0, start - absl::Hours(1)), std::nullopt);  // it waited in a queue
   EXPECT_EQ(left.At(0.1, start), std::nullopt);
   EXPECT_EQ(left.At(0.11, start + absl::Seconds(100)), std::nullopt);  // one percent says nothing
@@ -77,31 +89,15 @@ TEST(TimeLeftTest, IsThatOfTheMeanSpeed) {
 }
 
 TEST(TimeLeftTest, TextIsRoundedUp) {
-  EXPECT_EQ(TimeText(absl::Milliseconds(1)), "1 s");
-  EXPECT_EQ(TimeText(absl::Seconds(59)), "59 s");
-  EXPECT_EQ(TimeText(absl::Seconds(59.5)), "1 min");
-  EXPECT_EQ(TimeText(absl::Seconds(61)), "2 min");
-  EXPECT_EQ(TimeText(absl::Minutes(60)), "1 h 0 min");
-  EXPECT_EQ(TimeText(absl::Minutes(125)), "2 h 5 min");
-  EXPECT_EQ(TimeText(absl::Hours(99)), "99 h 0 min");
-  EXPECT_EQ(TimeText(absl::Hours(100)), "");
-  EXPECT_EQ(TimeText(absl::InfiniteDuration()), "");
-}
-
-TEST(ClosestWordTest, IsTheNearestOrTheOnlyOneThatStartsSo) {
-  const std::vector<std::string> words = {"mesh", "check", "render", "refine", "server", "session"};
-  EXPECT_EQ(ClosestWord("mehs", words), "mesh");
-  EXPECT_EQ(ClosestWord("msh", words), "mesh");
-  EXPECT_EQ(ClosestWord("meshes", words), "mesh");
-  EXPECT_EQ(ClosestWord("chekc", words), "check");
-  EXPECT_EQ(ClosestWord("rend", words), "render");
-  EXPECT_EQ(ClosestWord("re", words), "");  // two start so
-  EXPECT_EQ(ClosestWord("knit", words), "");
-  EXPECT_EQ(ClosestWord("", words), "");
-  EXPECT_EQ(ClosestWord(std::string(1 << 20, 'm'), words), "");
-  EXPECT_EQ(EditDistance("kitten", "sitting"), 3u);
-  EXPECT_EQ(EditDistance("ab", "ba"), 1u);
-  EXPECT_EQ(EditDistance("", "abc"), 3u);
+  EXPECT_EQ(client::TimeText(absl::Milliseconds(1)), "1 s");
+  EXPECT_EQ(client::TimeText(absl::Seconds(59)), "59 s");
+  EXPECT_EQ(client::TimeText(absl::Seconds(59.5)), "1 min");
+  EXPECT_EQ(client::TimeText(absl::Seconds(61)), "2 min");
+  EXPECT_EQ(client::TimeText(absl::Minutes(60)), "1 h 0 min");
+  EXPECT_EQ(client::TimeText(absl::Minutes(125)), "2 h 5 min");
+  EXPECT_EQ(client::TimeText(absl::Hours(99)), "99 h 0 min");
+  EXPECT_EQ(client::TimeText(absl::Hours(100)), "");
+  EXPECT_EQ(client::TimeText(absl::InfiniteDuration()), "");
 }
 
 TEST(JsonTextTest, HasNoControlCharactersAndNoBytesThatAreNoText) {
@@ -140,7 +136,7 @@ client::MeshHeader SmallMesh(int dimension) {
 }
 
 TEST(StatisticsJsonTest, HasEveryFigure) {
-  const nlohmann::json json = nlohmann::json::parse(StatisticsJson(SmallMesh(2), kInputVertex));
+  const nlohmann::json json = nlohmann::json(client::StatisticsJson(SmallMesh(2), kInputVertex));
   EXPECT_EQ(json["dimension"], 2);
   EXPECT_EQ(json["domain_low"][0], 0.1);
   EXPECT_EQ(json["input_points"], 6);
@@ -150,7 +146,7 @@ TEST(StatisticsJsonTest, HasEveryFigure) {
   EXPECT_EQ(json["seconds"]["total"], 1.5);
   EXPECT_EQ(json["counters"]["cuts"], 77);
   EXPECT_EQ(json["duplicate_of"], nlohmann::json::parse("[[2, 0], [4, 2], [5, 1]]"));
-  const nlohmann::json solid = nlohmann::json::parse(StatisticsJson(SmallMesh(3), kInputVertex));
+  const nlohmann::json solid = nlohmann::json(client::StatisticsJson(SmallMesh(3), kInputVertex));
   EXPECT_EQ(solid["min_dihedral_deg"], 20.5);
   EXPECT_FALSE(solid.contains("min_angle_deg"));
 }
@@ -182,7 +178,7 @@ TEST(SliverWarningTest, SaysWhatIsLeftAndWhy) {
       "given up when the bound on work was reached, which a smaller --rho avoids)\n"
       "  vertices 4 7 9 11: 0\u00b0, by demands\n");
   EXPECT_THAT(Summary(mesh), HasSubstr("; 1,200 slivers could not be repaired"));
-  const nlohmann::json slivers = nlohmann::json::parse(StatisticsJson(mesh, kInputVertex))["slivers"];
+  const nlohmann::json slivers = nlohmann::json(client::StatisticsJson(mesh, kInputVertex))["slivers"];
   EXPECT_EQ(slivers["left_by"], nlohmann::json::parse(R"({"demands": 1, "angle": 0, "work": 1199})"));
   EXPECT_EQ(slivers["flattest_left"],
             nlohmann::json::parse(R"([{"vertices": [4, 7, 9, 11], "min_dihedral_deg": 0.0, "reason": "demands"}])"));
@@ -194,7 +190,7 @@ TEST(SummaryTest, SaysHowManyVerticesHaveMoved) {
   mesh.moved_vertex_count = 2;
   EXPECT_THAT(Summary(mesh), HasSubstr("; 2 vertices of the mesh before have moved"));
   const std::vector<uint32_t> moved = {5, 8};
-  EXPECT_EQ(nlohmann::json::parse(StatisticsJson(mesh, kInputVertex, moved))["moved_vertices"],
+  EXPECT_EQ(nlohmann::json(client::StatisticsJson(mesh, kInputVertex, moved))["moved_vertices"],
             nlohmann::json::parse("[5, 8]"));
 }
 
@@ -332,7 +328,7 @@ TEST(HelpfulThreadsTest, SizesCount) {
   EXPECT_GE(HelpfulThreads(options, cloud), 1);
 }
 
-// What the command asks a server for.
+// The number of threads that the command asks a server for.
 TEST(HelpfulThreadsTest, AreAskedForUnlessTheUserSays) {
   const TemporaryFolder folder;
   std::string text;

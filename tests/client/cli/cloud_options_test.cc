@@ -1,4 +1,4 @@
-// How the commands that read clouds read them: --columns, --skip-invalid, and what is said of it.
+// Options of the commands that read clouds: --columns, --skip-invalid, and the messages about them.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

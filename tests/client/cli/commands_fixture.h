@@ -1,4 +1,4 @@
-// What tests of commands that need no server share: two clouds, and meshing that has to succeed or to fail.
+// A fixture for tests of commands that need no server: two clouds, and meshing that has to succeed or to fail.
 #ifndef WELLSPACE_TESTS_CLIENT_CLI_COMMANDS_FIXTURE_H_
 #define WELLSPACE_TESTS_CLIENT_CLI_COMMANDS_FIXTURE_H_
 
@@ -39,7 +39,7 @@ class CommandsTest : public testing::Test {
     ASSERT_EQ(result.exit_code, 0) << result.err;
   }
 
-  // Fails the test unless meshing `cloud` ends with `exit_code`, nothing written; returns what was printed.
+  // Fails the test unless meshing `cloud` ends with `exit_code`, nothing written; returns the output.
   std::string MeshFails(const std::string& name, std::string_view cloud, int exit_code,
                         const std::vector<std::string>& more = {}) {
     std::vector<std::string> arguments = {"mesh", folder_.Write(name, cloud), "-o", Path("out.vtu")};

@@ -1,4 +1,4 @@
-// The program from the outside: what it prints, writes and returns.
+// The program from the outside: its output, its files and its exit codes.
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -206,9 +206,9 @@ TEST_F(CommandsTest, SliversAreRepairedOrPumpedAway) {
   EXPECT_THAT(repaired.out, AllOf(HasSubstr("below 12\u00b0                0 (0.0000 %)"), Not(HasSubstr("regular"))));
   EXPECT_THAT(folder_.Read("quality.svg"), AllOf(testing::StartsWith("<?xml"), HasSubstr("</svg>")));
   EXPECT_EQ(RunWellspace({"check", Path("repaired.vtu"), "--min-dihedral", "40"}).exit_code, 1);
-  const RunResult bad_plot = RunWellspace({"check", Path("repaired.vtu"), "--plot", Path("quality.pdf")});
+  const RunResult bad_plot = RunWellspace({"check", Path("repaired.vtu"), "--plot", Path("quality.gif")});
   EXPECT_EQ(bad_plot.exit_code, 2);
-  EXPECT_THAT(bad_plot.err, HasSubstr("expected a picture .png or .svg"));
+  EXPECT_THAT(bad_plot.err, HasSubstr("expected a picture .png, .svg or .pdf"));
 
   for (const char* name : {"pumped.vtu", "pumped.npz", "pumped.node"}) {
     Mesh(cloud, name, {"--min-dihedral", "0", "--pump-weights", "--stats", Path("stats.json")});
@@ -252,7 +252,7 @@ TEST_F(CommandsTest, FlatTetrahedraOfATorusAreRepairedAndSpokenOf) {
   ASSERT_TRUE(statistics["slivers"].is_object());
   EXPECT_EQ(statistics["slivers"]["left"], 0);
   EXPECT_GT(statistics["slivers"]["operations"], 0);
-  // What cannot be repaired is told of, though not in the exit code.
+  // Slivers that cannot be repaired are told of, though not in the exit code.
   const RunResult left = RunWellspace({"mesh", folder_.Write("other.csv", torus(12, 24)), "-o", Path("left.vtu"),
                                        "--criterion", "well-spaced", "--min-dihedral", "18", "--quiet"});
   EXPECT_EQ(left.exit_code, 0);
@@ -391,7 +391,7 @@ TEST_F(CommandsTest, CheckHoldsMeshesToTheCriterionAndToSizes) {
   EXPECT_EQ(check("plain.vtu", sizes).exit_code, 1);
   EXPECT_EQ(check("small.vtu", {"--size", "0.15"}).exit_code, 1);
   EXPECT_EQ(check("small.vtu", {"--size-box", "0.5,0.5,1,1,0.05"}).exit_code, 1);
-  // What cannot be asked for is no violation.
+  // Demands that are not valid are no violation.
   const std::vector<std::pair<std::vector<std::string>, std::string>> wrong = {
       {{"--criterion", "well-spaced"}, "--criterion requires --rho"},
       {{"--size", "-1"}, "--size: expected a number above 0, got \"-1\""},
@@ -453,7 +453,7 @@ TEST_F(CommandsTest, SizesAtPointsAreReadKeptAndChecked) {
   EXPECT_THAT(MeshFails("cloud.csv", kPlane, 2, {"--size-field", sizes, "--size-field-between", "interpolate"}),
               HasSubstr("no simplices"));
 
-  // What is wrong is named by the row of the file.
+  // Errors of sizes name the row of the file.
   folder_.Write("sizes.csv", "x,y,h\n0.25,0.25,0.01\n0.5,0.75,nan\nNA,0.75,0.02\n");
   EXPECT_THAT(MeshFails("cloud.csv", kPlane, 2, options), HasSubstr(sizes + ":3: column 3: expected a finite number"));
   std::vector<std::string> skipping = options;
@@ -510,7 +510,7 @@ TEST_F(CommandsTest, ServerInfoOfTheEmbeddedServer) {
   EXPECT_THAT(result.out, AllOf(HasSubstr("embedded"), HasSubstr("version"), HasSubstr("2, 3"), HasSubstr("workers")));
 }
 
-// Reads what a descriptor has until it ends.
+// Reads a descriptor until it ends.
 std::string ReadAll(int descriptor) {
   std::string text;
   char buffer[4096];

@@ -156,7 +156,7 @@ TEST_F(FileCommandsTest, ConvertReadsMeshesOfVtkOrTellsWhatItLeavesOut) {
   EXPECT_THAT(quads.err, HasSubstr("note: only points are read, since it is no mesh of simplices"));
   const RunResult json = RunWellspace({"convert", Path("b.vtk"), Path("b.vtu"), "--output", "json"});
   EXPECT_EQ(nlohmann::json::parse(json.out)["notes"].size(), 3);  // also that they are in the plane
-  // What the other format has no place for.
+  // Attributes that the other format has no place for.
   Mesh(kMeasured, "measured.vtu");
   const RunResult su2 = RunWellspace({"convert", Path("measured.vtu"), Path("measured.msh")});
   EXPECT_THAT(su2.err,

@@ -67,7 +67,7 @@ class ManualTest(unittest.TestCase):
 
 class BashTest(unittest.TestCase):
     def complete(self, *words, folder="."):
-        """What bash offers for the last of `words`."""
+        """The completions that bash offers for the last of `words`."""
         line = " ".join(f"'{word}'" for word in ("wellspace", *words))
         script = (f'source "$1"; COMP_WORDS=({line}); COMP_CWORD={len(words)}; _wellspace; '
                   'printf "%s\\n" "${COMPREPLY[@]}"')
@@ -123,7 +123,7 @@ class FishTest(unittest.TestCase):
         self.script = script_of(self, "fish", "wellspace.fish")
 
     def complete(self, *lines):
-        """What fish offers at the end of each line: words without their descriptions."""
+        """The completions that fish offers at the end of each line: words without their descriptions."""
         commands = "".join(f"complete -C'wellspace {line}'; echo ---;" for line in lines)
         folder = os.path.dirname(self.script)
         result = subprocess.run(["fish", "-c", f"source {self.script}; {commands}"], capture_output=True, text=True,
@@ -165,7 +165,7 @@ class ZshTest(unittest.TestCase):
         self.script = script_of(self, "zsh", "_wellspace")
 
     def specifications(self, *words):
-        """What the script hands to zsh's own functions for the last of `words`."""
+        """The arguments of zsh's own functions, as the script calls them for the last of `words`."""
         line = " ".join(f"'{word}'" for word in ("wellspace", *words))
         code = ('_arguments() { print -rl -- "$@" }; _describe() { print -rl -- "${(@P)2}" }; '
                 f'words=({line}); CURRENT=$#words; source "$1"')

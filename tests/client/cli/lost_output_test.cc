@@ -86,7 +86,7 @@ TEST_F(LostOutputTest, APipeThatIsClosedIsExitCode4) {
   close(ends[1]);
 }
 
-// What is printed must not go to a file that has got the number of standard output.
+// Output must not go to a file that has got the number of standard output.
 TEST_F(LostOutputTest, AClosedStandardOutputIsExitCode4) {
   ASSERT_EQ(RunWellspace({"mesh", cloud_, "-o", Path("right.vtu")}).exit_code, 0);
   for (const char* shell : {"exec >&-", "exec <&- >&-"}) {
@@ -177,7 +177,7 @@ TEST_F(LostOutputTest, SignalsLeaveNoTemporaryFile) {
     const int reader = open(pipe.c_str(), O_RDONLY | O_CLOEXEC);  // returns once the program opens it for writing
     ASSERT_GE(reader, 0);
     char buffer[4096];
-    ASSERT_GT(read(reader, buffer, 1), 0);      // what is buffered is full, and all files are open
+    ASSERT_GT(read(reader, buffer, 1), 0);      // the buffer is full, and all files are open
     EXPECT_EQ(folder_.FileCount(), files + 3);  // .ele, .edge and .poly
     for (const int signal : one.signals) {
       process.Send(signal);

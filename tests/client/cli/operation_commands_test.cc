@@ -34,7 +34,7 @@ TEST_F(OperationCommandsTest, RefineWaitsForTheEnd) {
   EXPECT_FALSE(started_.has_parameters());
   const RunResult result = Run({"refine", "one", "--output", "json", "--rho", "3", "--expected-revision", "8"});
   EXPECT_EQ(json::parse(result.out)["state"], "succeeded");
-  // What is not given stays as the session has it.
+  // Options that are not given stay as the session has them.
   EXPECT_EQ(started_.parameters().dimension(), 2);
   EXPECT_EQ(started_.parameters().rho(), 3);
   EXPECT_EQ(started_.parameters().threads(), 3);
@@ -89,7 +89,7 @@ TEST_F(OperationCommandsTest, CancelWaitsForTheEnd) {
   }
 }
 
-// The signal comes when the watch stands. What is cancelled is watched to its end: the session is then free.
+// The signal comes when the watch stands. A cancelled refinement is watched to its end: the session is then free.
 TEST_F(OperationCommandsTest, CtrlCCancelsTheRefinementButNotAWatchedOne) {
   OperationsEndAs({});
   std::promise<void> watched;
@@ -156,7 +156,7 @@ TEST_F(OperationCommandsTest, AnyFractionIsDrawn) {
   EXPECT_THAT(result.out, ::testing::HasSubstr("succeeded"));
   std::string drawn(4096, '\0');
   drawn.resize(std::max<ssize_t>(0, read(terminal, drawn.data(), drawn.size())));
-  EXPECT_THAT(drawn, ::testing::HasSubstr("[------------------------]   0%"));
+  EXPECT_THAT(drawn, ::testing::HasSubstr("[----------------]   0%"));
   close(error);
   close(terminal);
 }

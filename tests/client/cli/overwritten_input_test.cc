@@ -1,4 +1,4 @@
-// No command writes over what it reads, or one file twice: it says so before any work.
+// No command writes over its input, or one file twice: it says so before any work.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>

@@ -22,7 +22,7 @@ struct RunOptions {
   std::vector<std::string> environment;  // NAME=value, besides that of the test; WELLSPACE_SERVER is unset otherwise
   int error_descriptor = -1;             // standard error goes there instead of to RunResult::err
   int output_descriptor = -1;            // the same of standard output
-  std::string shell = "";                // what sh does before it becomes the program: "exec >/dev/full", "ulimit -f 1"
+  std::string shell = "";                // commands before sh becomes the program: "exec >/dev/full", "ulimit -f 1"
 };
 
 // One run of the program.

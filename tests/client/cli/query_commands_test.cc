@@ -112,7 +112,7 @@ TEST_F(QueryCommandsTest, AddPrintsTheVertices) {
   EXPECT_THAT(outside.err, HasSubstr("<stdin>:2: points[1] is outside"));
 }
 
-// A request has 4 MiB: what is larger comes in several, each of the revision that the one before has made.
+// A request has 4 MiB: more points come in several, each of the revision that the one before has made.
 TEST_F(QueryCommandsTest, AddsMorePointsThanARequestHas) {
   constexpr size_t kCount = 300'000;
   std::vector<int> sizes;
@@ -153,8 +153,9 @@ TEST_F(QueryCommandsTest, AddsMorePointsThanARequestHas) {
   refuse_from = first;
   const RunResult refused = Run({"add", "one", path});
   EXPECT_EQ(refused.exit_code, 2);
-  EXPECT_THAT(refused.err, HasSubstr("cloud.csv:" + std::to_string(first + 2) + ": points[1] is outside; the first " +
-                                     std::to_string(first) + " of 300000 points were added before"));
+  EXPECT_THAT(refused.err,
+              HasSubstr("cloud.csv:" + std::to_string(first + 2) + ": points[" + std::to_string(first + 1) +
+                        "] is outside; the first " + std::to_string(first) + " of 300000 points were added before"));
   EXPECT_EQ(std::count(refused.out.begin(), refused.out.end(), '\n'), static_cast<std::ptrdiff_t>(first));
 }
 

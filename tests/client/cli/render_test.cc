@@ -1,3 +1,4 @@
+// Scenes of meshes: what is drawn, cut, ordered and coloured, on meshes of a few simplices whose pictures are known.
 #include <cairo.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,10 +16,10 @@
 #include <string>
 #include <vector>
 
-#include "client/cli/render/colour_ramp.h"
-#include "client/cli/render/painter.h"
-#include "client/cli/render/scene.h"
-#include "core/mesher.h"
+#include "client/render/colour_ramp.h"
+#include "client/render/painter.h"
+#include "client/render/scene.h"
+#include "core/meshers/mesher.h"
 #include "core/simplex/quality.h"
 #include "tests/support/meshes.h"
 #include "tests/support/temporary_folder.h"
@@ -61,8 +62,8 @@ TEST(SceneTest, PlaneMeshIsDrawnAsItIs) {
   EXPECT_EQ(scene->width, 2);
   EXPECT_EQ(scene->height, 1);
   EXPECT_NEAR(TotalArea(*scene), 2, 1e-6);
-  EXPECT_NEAR(scene->facets[0].angle_deg, std::atan2(1, 2) * 180 / std::numbers::pi, 1e-4);
-  EXPECT_EQ(scene->best_angle_deg, 60);
+  EXPECT_NEAR(60 * scene->facets[0].share, std::atan2(1, 2) * 180 / std::numbers::pi, 1e-4);
+  EXPECT_EQ(scene->high, 60);
 }
 
 // A convex body covers its picture exactly once.
@@ -85,6 +86,38 @@ TEST(SceneTest, CutKeepsTheSideThatTheNormalDoesNotPointTo) {
   EXPECT_LT(half->height, whole->height);
   EXPECT_EQ(half->facets.size(), 2u * (4 * 4 + 2 * 4 + 2 * 4));
   EXPECT_EQ(whole->facets.size(), 2u * 3 * 4 * 4);
+}
+
+// The shadow of a cube of side 3 is 9 times the sum of the direction's coordinates.
+TEST(SceneTest, TheCameraIsWhereItIsPut) {
+  for (const std::array<double, 3>& camera :
+       {std::array<double, 3>{1, 0, 0}, {0, 0, 5}, {0, -2, 0}, {1, 1, 1}, {-3, 0.5, 2}, {1e-30, 0, 0}}) {
+    const absl::StatusOr<Scene> scene = MakeScene(Cubes(3).View(), {.only_boundary = true, .camera = camera});
+    ASSERT_TRUE(scene.ok()) << scene.status();
+    const double norm = std::hypot(camera[0], camera[1], camera[2]);
+    const double sum = std::abs(camera[0]) + std::abs(camera[1]) + std::abs(camera[2]);
+    EXPECT_NEAR(TotalArea(*scene), 9 * sum / norm, 1e-4);
+  }
+  // From the side, the axis that points upwards is the height.
+  const formats::Mesh mesh = {
+      .dimension = 3, .points = {0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0, 5}, .simplices = {0, 1, 2, 3}};
+  const absl::StatusOr<Scene> side =
+      MakeScene(mesh.View(), {.only_boundary = true, .camera = std::array<double, 3>{1, 0, 0}, .up = 2});
+  ASSERT_TRUE(side.ok()) << side.status();
+  EXPECT_NEAR(side->height, 5, 1e-9);
+  EXPECT_NEAR(side->width, 2, 1e-9);
+}
+
+TEST(SceneTest, CamerasThatCannotBe) {
+  const auto refused = [](const formats::Mesh& mesh, const View& view) {
+    return std::string(MakeScene(mesh.View(), view).status().message());
+  };
+  constexpr std::array<double, 3> kFront = {1, 0, 0};
+  EXPECT_THAT(refused(Cubes(1), {.camera = std::array<double, 3>{0, 0, 0}}), HasSubstr("camera"));
+  EXPECT_THAT(refused(Cubes(1), {.camera = std::array<double, 3>{1e300, 1e300, 1e300}}), testing::IsEmpty());
+  EXPECT_THAT(refused(Square(), {.camera = kFront}), HasSubstr("2-D"));
+  EXPECT_THAT(refused(Square(), {.only_boundary = true}), HasSubstr("2-D"));
+  EXPECT_THAT(refused(Cubes(1), {.plane = Plane{{0, 0, 1}, 1}, .only_boundary = true}), HasSubstr("boundary alone"));
 }
 
 using Vector = std::array<double, 3>;
@@ -175,7 +208,7 @@ Kept KeptOf(const core::Mesh& mesh) {
   return kept;
 }
 
-// At every sample, what is painted last is the tetrahedron that a line of sight enters first.
+// At every sample, the tetrahedron painted last is the one that a line of sight enters first.
 TEST(SceneTest, PaintersOrderShowsWhatIsInFront) {
   const uint64_t seed = Seed();
   SCOPED_TRACE(testing::Message() << "WELLSPACE_SEED=" << seed);
@@ -204,7 +237,7 @@ TEST(SceneTest, PaintersOrderShowsWhatIsInFront) {
     int covers = 0;
     for (const Facet& facet : scene->facets) {
       if (Covers(facet, x, y)) {
-        painted = facet.angle_deg;
+        painted = facet.share * scene->high;
         ++covers;
       }
     }
@@ -231,6 +264,9 @@ TEST(SceneTest, Errors) {
   EXPECT_THAT(message(Cubes(1), {.plane = Plane{{0, 0, 0}, 1}, .up = 2}), HasSubstr("normal has a direction"));
   EXPECT_THAT(message(Cubes(1), {.plane = Plane{{1, 0, 0}, -1}, .up = 2}), HasSubstr("cuts off all of the 6"));
   EXPECT_THAT(message(Square(), {.colouring = Colouring::kRegion}), HasSubstr("tells of no regions"));
+  EXPECT_THAT(message(Square(), {.only_boundary = true}), HasSubstr("of 3-D meshes, and this one is 2-D"));
+  EXPECT_THAT(message(Square(), {.colouring = Colouring::kBoundary}), HasSubstr("expected such a mesh"));
+  EXPECT_THAT(message(Cubes(1), {.colouring = Colouring::kBoundary}), HasSubstr("expected such a mesh"));
   formats::Mesh huge = Square();
   huge.points[0] = -1e300;
   EXPECT_THAT(message(huge, {}), HasSubstr("at most 1e150"));
@@ -248,6 +284,52 @@ formats::Mesh TwoRegions() {
   return mesh;
 }
 
+TEST(SceneTest, ColoursOfAFieldAreMeansOfCorners) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const formats::PointAttribute field = {.name = "heat", .values = {-2, 1, 10, nan}};
+  const View view = {.colouring = Colouring::kField, .field = &field};
+  const absl::StatusOr<Scene> scene = MakeScene(TwoRegions().View(), view);
+  ASSERT_TRUE(scene.ok()) << scene.status();
+  EXPECT_TRUE(scene->categories.empty());
+  EXPECT_FALSE(scene->is_angle);
+  EXPECT_EQ(scene->legend, "heat");
+  EXPECT_EQ(scene->low, -2);
+  EXPECT_EQ(scene->high, 10);
+  EXPECT_NEAR(scene->facets[0].share, (3.0 + 2) / 12, 1e-6);
+  EXPECT_TRUE(std::isnan(scene->facets[1].share)) << "a corner has no value";
+}
+
+// The cube's facets at x = 0, where the field is 0, and others.
+TEST(SceneTest, ColoursOfAFieldOnACut) {
+  const formats::Mesh mesh = Cubes(1);
+  formats::PointAttribute field = {.name = "x", .values = {}};
+  for (uint64_t vertex = 0; vertex < mesh.View().vertex_count(); ++vertex) {
+    field.values.push_back(mesh.points[3 * vertex] * 1e308);  // whose sums are beyond doubles
+  }
+  const absl::StatusOr<Scene> scene = MakeScene(
+      mesh.View(), {.only_boundary = true, .camera = {{-1, 0, 0}}, .colouring = Colouring::kField, .field = &field});
+  ASSERT_TRUE(scene.ok()) << scene.status();
+  ASSERT_EQ(scene->facets.size(), 2u);
+  EXPECT_EQ(scene->facets[0].share, 0);
+  EXPECT_EQ(scene->facets[1].share, 0);
+}
+
+TEST(SceneTest, AFieldHasValues) {
+  const formats::PointAttribute one = {.name = "one", .values = std::vector<double>(4, 7.5)};
+  const absl::StatusOr<Scene> scene = MakeScene(Square().View(), {.colouring = Colouring::kField, .field = &one});
+  ASSERT_TRUE(scene.ok()) << scene.status();
+  EXPECT_EQ(scene->facets[0].share, 0.5);
+  const formats::PointAttribute none = {.name = "none",
+                                        .values = std::vector<double>(4, std::numeric_limits<double>::infinity())};
+  EXPECT_THAT(
+      std::string(MakeScene(Square().View(), {.colouring = Colouring::kField, .field = &none}).status().message()),
+      HasSubstr("no vertex has a finite value of none"));
+  const formats::PointAttribute few = {.name = "few", .values = {1, 2, 3}};
+  EXPECT_THAT(
+      std::string(MakeScene(Square().View(), {.colouring = Colouring::kField, .field = &few}).status().message()),
+      HasSubstr("expected a value of few for each of the 4 vertices, got 3"));
+}
+
 TEST(SceneTest, TheBoundaryOfAPlaneMeshIsDrawn) {
   const absl::StatusOr<Scene> scene = MakeScene(TwoRegions().View(), {});
   ASSERT_TRUE(scene.ok()) << scene.status();
@@ -261,16 +343,16 @@ TEST(SceneTest, ColoursMeanRegionsWhereThereAreSeveral) {
   for (const std::optional<Colouring> colouring : {std::optional<Colouring>(), std::optional(Colouring::kRegion)}) {
     const absl::StatusOr<Scene> scene = MakeScene(mesh.View(), {.colouring = colouring});
     ASSERT_TRUE(scene.ok()) << scene.status();
-    EXPECT_THAT(scene->regions, ::testing::ElementsAre("lake", "region 7"));
-    EXPECT_EQ(scene->facets[0].region, 1u);
-    EXPECT_EQ(scene->facets[1].region, 0u);
+    EXPECT_THAT(scene->categories, ::testing::ElementsAre("lake", "region 7"));
+    EXPECT_EQ(scene->facets[0].category, 1u);
+    EXPECT_EQ(scene->facets[1].category, 0u);
   }
-  EXPECT_TRUE(MakeScene(mesh.View(), {.colouring = Colouring::kAngle})->regions.empty());
+  EXPECT_TRUE(MakeScene(mesh.View(), {.colouring = Colouring::kAngle})->categories.empty());
   formats::Mesh one = mesh;
   one.simplex_regions = {};
   one.regions.resize(1);
-  EXPECT_TRUE(MakeScene(one.View(), {})->regions.empty());
-  EXPECT_THAT(MakeScene(one.View(), {.colouring = Colouring::kRegion})->regions, ::testing::ElementsAre("lake"));
+  EXPECT_TRUE(MakeScene(one.View(), {})->categories.empty());
+  EXPECT_THAT(MakeScene(one.View(), {.colouring = Colouring::kRegion})->categories, ::testing::ElementsAre("lake"));
 }
 
 TEST(SceneTest, TetrahedraHaveTheColourOfTheirRegion) {
@@ -288,10 +370,82 @@ TEST(SceneTest, TetrahedraHaveTheColourOfTheirRegion) {
   ASSERT_TRUE(scene.ok()) << scene.status();
   const auto of_region = [&](uint32_t region) {
     return std::count_if(scene->facets.begin(), scene->facets.end(),
-                         [region](const Facet& facet) { return facet.region == region; });
+                         [region](const Facet& facet) { return facet.category == region; });
   };
   EXPECT_EQ(of_region(0), 2 * 2 * 2);
   EXPECT_EQ(of_region(1), 2 * 2 * 2 + 2 * 4);
+}
+
+// Two cubes on each other: the upper one's facets have a tag, and of the lower one the bottom and those between them.
+formats::Mesh TwoSolids() {
+  formats::Mesh cubes = Cubes(1);
+  const formats::Mesh lower = cubes;
+  for (size_t i = 2; i < cubes.points.size(); i += 3) {
+    cubes.points[i] += 1;
+  }
+  const auto below = static_cast<uint32_t>(cubes.points.size() / 3);
+  cubes.points.insert(cubes.points.end(), lower.points.begin(), lower.points.end());
+  std::vector<uint32_t> number;  // of the lower cube's vertices: those at the top are the upper one's
+  for (uint32_t v = 0; v < below; ++v) {
+    const auto at = [&](uint32_t u, int axis) { return cubes.points[3 * size_t{u} + axis]; };
+    number.push_back(below + v);
+    for (uint32_t u = 0; u < below; ++u) {
+      if (at(u, 0) == at(below + v, 0) && at(u, 1) == at(below + v, 1) && at(u, 2) == at(below + v, 2)) {
+        number.back() = u;
+      }
+    }
+  }
+  const size_t upper = cubes.simplices.size() / 4;
+  for (const uint32_t v : lower.simplices) {
+    cubes.simplices.push_back(number[v]);
+  }
+  cubes.simplex_regions.assign(upper, 2);
+  cubes.simplex_regions.resize(cubes.simplices.size() / 4, 1);
+  cubes.regions = {{.id = 1, .name = "base"}, {.id = 2, .name = "top"}};
+  cubes.boundary = {{.tag = 4, .name = "sky", .facets = 0}, {.tag = 6, .name = "", .facets = 0}};
+  for (const double z : {2.0, 1.0}) {
+    for (size_t s = 0; s < 4 * upper; s += 4) {
+      for (size_t skip = 0; skip < 4; ++skip) {
+        std::vector<uint32_t> row;
+        for (size_t k = 0; k < 4; ++k) {
+          if (k != skip && cubes.points[3 * size_t{cubes.simplices[s + k]} + 2] == z) {
+            row.push_back(cubes.simplices[s + k]);
+          }
+        }
+        if (row.size() == 3) {
+          cubes.facets.insert(cubes.facets.end(), row.begin(), row.end());
+          ++cubes.boundary[z == 2 ? 0 : 1].facets;
+        }
+      }
+    }
+  }
+  return cubes;
+}
+
+TEST(SceneTest, TheBoundaryAloneHasTheColoursOfItsParts) {
+  const formats::Mesh mesh = TwoSolids();
+  ASSERT_EQ(mesh.boundary[0].facets, 2);
+  ASSERT_EQ(mesh.boundary[1].facets, 2);
+  const absl::StatusOr<Scene> scene = MakeScene(mesh.View(), {.only_boundary = true});
+  ASSERT_TRUE(scene.ok()) << scene.status();
+  // Nothing is cut off: of both cubes two sides are seen, and the top, which alone has a tag; no facets between them.
+  const auto count_of = [](const Scene& drawn, uint32_t category) {
+    return std::count_if(drawn.facets.begin(), drawn.facets.end(),
+                         [category](const Facet& facet) { return facet.category == category; });
+  };
+  EXPECT_THAT(scene->categories, ::testing::ElementsAre("sky", "tag 6", "no tag"));
+  EXPECT_EQ(count_of(*scene, 0), 2);
+  EXPECT_EQ(count_of(*scene, 1), 0);
+  EXPECT_EQ(count_of(*scene, 2), 2 * 2 * 2);
+  // Cut between the cubes, the facets there are seen from above.
+  const absl::StatusOr<Scene> cut =
+      MakeScene(mesh.View(), {.plane = Plane{{0, 0, 1}, 1}, .colouring = Colouring::kBoundary});
+  ASSERT_TRUE(cut.ok()) << cut.status();
+  EXPECT_EQ(count_of(*cut, 0), 0);
+  EXPECT_EQ(count_of(*cut, 1), 2);
+  EXPECT_EQ(count_of(*cut, 2), 2 * 2);
+  EXPECT_THAT(MakeScene(mesh.View(), {.only_boundary = true, .colouring = Colouring::kRegion})->categories,
+              ::testing::ElementsAre("base", "top"));
 }
 
 TEST(ColourRampTest, ColoursOfRegionsDiffer) {
@@ -423,12 +577,23 @@ TEST(PainterTest, Svg) {
   EXPECT_THAT(svg, HasSubstr("</svg>"));
 }
 
+TEST(PainterTest, PdfIsTheSameAtAnyTime) {
+  TemporaryFolder folder;
+  const absl::StatusOr<Scene> scene = MakeScene(Square().View(), {});
+  ASSERT_TRUE(WritePicture(*scene, 640, PictureFormat::kPdf, folder.Path("square.pdf")).ok());
+  const std::string pdf = folder.Read("square.pdf");
+  EXPECT_THAT(pdf, StartsWith("%PDF-1."));
+  EXPECT_THAT(pdf, HasSubstr("/MediaBox [ 0 0 640 "));
+  EXPECT_THAT(pdf, testing::Not(HasSubstr("CreationDate")));
+}
+
 TEST(PainterTest, Errors) {
   const absl::StatusOr<Scene> scene = MakeScene(Square().View(), {});
   EXPECT_EQ(WritePicture(*scene, 640, PictureFormat::kPng, "/dev/full").code(), absl::StatusCode::kResourceExhausted);
   EXPECT_EQ(WritePicture(*scene, 640, PictureFormat::kPng, "/none/a.png").code(), absl::StatusCode::kNotFound);
   EXPECT_FALSE(PictureFormatOf("a.gif").ok());
   EXPECT_EQ(*PictureFormatOf("a.SVG"), PictureFormat::kSvg);
+  EXPECT_EQ(*PictureFormatOf("a.pdf"), PictureFormat::kPdf);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// What tests of the commands about sessions share: a server of the test's making, with one session on it.
+// A fixture for tests of the commands about sessions: a server of the test's making, with one session on it.
 #ifndef WELLSPACE_TESTS_CLIENT_CLI_SESSION_FIXTURE_H_
 #define WELLSPACE_TESTS_CLIENT_CLI_SESSION_FIXTURE_H_
 

@@ -57,7 +57,7 @@ def shuffled(points, faces, seed):
 
 
 def without_lines(value):
-    """Figures without what names lines of the file."""
+    """Figures without those that name lines of the file."""
     if isinstance(value, dict):
         return {key: without_lines(item) for key, item in value.items() if key not in ("triangles", "triangle", "file")
                 or isinstance(item, int)}

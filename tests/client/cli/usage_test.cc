@@ -1,4 +1,4 @@
-// What the program says of wrong usage, and its exit codes.
+// Wrong usage of the program: its messages and exit codes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -123,12 +123,12 @@ TEST_F(UsageTest, HelpSpeaksOfDomains) {
   for (const char* command : {"mesh", "estimate", "upload"}) {
     const std::string help = RunWellspace({command, "--help"}).out;
     EXPECT_THAT(help.substr(0, help.find('\n')), HasSubstr("domain")) << command;
-    EXPECT_THAT(help, HasSubstr("File of points or of a domain")) << command;
+    EXPECT_THAT(help, HasSubstr("File of points, of a domain or of a surface")) << command;
   }
   EXPECT_THAT(RunWellspace({"manual"}).out, HasSubstr("meshes of point clouds and of domains"));
 }
 
-// What is wrong is said with where to read more, for programs as JSON.
+// A message about wrong usage says where to read more; for programs it is JSON.
 TEST_F(UsageTest, WrongUsageIsExplained) {
   struct Case {
     std::vector<std::string> arguments;
@@ -148,8 +148,7 @@ TEST_F(UsageTest, WrongUsageIsExplained) {
        "a command is missing; expected one of create, list, show, update, delete; see wellspace session --help"},
       {{"session", "make"}, "there is no command make; expected one of create, "},
       {{"mesh"}, "IN is required; see wellspace mesh --help"},
-      {{"mesh", "a.csv", "-o", "a.vtu", "--bogus", "7", "more"},
-       "not expected: --bogus 7 more; see wellspace mesh --help"},
+      {{"mesh", "a.csv", "-o", "a.vtu", "--bogus", "7", "more"}, "not expected: --bogus; see wellspace mesh --help"},
       {{"mesh", "a.csv", "-o", "a.vtu", "--sise=7"},
        "not expected: --sise=7 (did you mean --size?); see wellspace mesh --help"},
       {{"mesh", "a.csv", "-o", "a.vtu", "--timeout", "0"}, "--timeout: expected a number above 0, got \"0\""},

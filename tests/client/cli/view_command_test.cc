@@ -32,7 +32,7 @@ class ViewCommandTest : public CommandsTest {
     return nlohmann::json::parse(page.substr(from + start.size(), page.find("</script>", from) - from - start.size()));
   }
 
-  // A browser that makes the file `opened`, with what it got, under its name at once.
+  // A browser that makes the file `opened`, with its arguments, under its name at once.
   std::string Browser() const {
     const std::string path = folder_.Write("browser",
                                            "#!/bin/sh\nprintf '%s' \"$@\" > \"$0.part\"\n"

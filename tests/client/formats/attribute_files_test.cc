@@ -64,7 +64,7 @@ TEST_F(AttributeFilesTest, NamesOfFiles) {
   EXPECT_THAT(NamesToWrite(attributes), ElementsAre("origin_", "attribute", "a_b", "a_b_", "x y"));
 }
 
-// What is written as attributes of a mesh is read as attributes of its vertices.
+// Attributes of a mesh, once written, are read as attributes of its vertices.
 TEST_F(AttributeFilesTest, ComeBackFromVtuAndVtk) {
   const std::vector<double> points = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
   const std::vector<uint32_t> simplices = {0, 1, 2, 3};

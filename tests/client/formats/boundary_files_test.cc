@@ -77,6 +77,44 @@ TEST_F(BoundaryFilesTest, RoundTripsKeepFacetsAndTags) {
   }
 }
 
+// Formats without a place for ridges leave them out.
+TEST_F(BoundaryFilesTest, RoundTripsKeepRidgesWhereThereIsAPlace) {
+  Mesh mesh = MeshWithBoundary(3);
+  mesh.ridges = {7, 8, 8, 299, 0, 7};
+  for (const Kind& kind : kKinds) {
+    SCOPED_TRACE(kind.format);
+    Write(mesh, kind.file, kind.format);
+    const Mesh read = ReadGood(kind.file);
+    const bool has_place = kind.format == std::string("npz") || kind.format == std::string("medit");
+    EXPECT_EQ(read.ridges, has_place ? mesh.ridges : std::vector<uint32_t>());
+    EXPECT_EQ(read.facets, mesh.facets);
+    EXPECT_EQ(read.boundary, mesh.boundary);
+    const auto writer = CreateMesh(folder_.Path(kind.file), kind.format, mesh.View().Shape());
+    ASSERT_TRUE(writer.ok()) << writer.status();
+    ASSERT_TRUE((*writer)->AddPoints(mesh.points).ok());
+    ASSERT_TRUE((*writer)->AddVertexOrigins(mesh.vertex_origins).ok());
+    ASSERT_TRUE((*writer)->AddVertexTags(mesh.vertex_tags).ok());
+    ASSERT_TRUE((*writer)->AddSimplices(mesh.simplices).ok());
+    ASSERT_TRUE((*writer)->AddFacets(mesh.facets).ok());
+    EXPECT_EQ((*writer)->Commit().code(), has_place ? absl::StatusCode::kInternal : absl::StatusCode::kOk)
+        << "without the ridges that were announced";
+  }
+}
+
+TEST_F(BoundaryFilesTest, RidgesOfMeditAreEdgesOfTheFile) {
+  Mesh mesh = MeshWithBoundary(3);
+  mesh.ridges = {7, 8, 8, 299, 0, 7};
+  Write(mesh, "mesh.mesh");
+  EXPECT_THAT(folder_.Read("mesh.mesh"), HasSubstr("Edges\n3\n8 9 0\n9 300 0\n1 8 0\nRidges\n3\n1\n2\n3\nEnd\n"));
+  EXPECT_THAT(ReadBadWith("mesh.mesh", "Ridges\n3\n1\n2\n3\n", "Ridges\n2\n1\n4\n"),
+              HasSubstr("Ridges: number 2 of them: expected an edge from 1 to 3, got 4"));
+  Write(mesh, "mesh.mesh");
+  EXPECT_THAT(ReadBadWith("mesh.mesh", "Ridges\n3\n1\n2\n3\n", "Ridges\n1\n0\n"), HasSubstr("got 0"));
+  Write(mesh, "mesh.mesh");
+  EXPECT_THAT(ReadBadWith("mesh.mesh", "Ridges\n3\n1\n2\n3\n", "Ridges\n4\n1\n2\n3\n"),
+              HasSubstr("the number of an edge"));
+}
+
 // A mesh that is told nothing of gives the file that it always gave: other tests have these to the byte.
 TEST_F(BoundaryFilesTest, NoBoundaryIsNoBoundary) {
   for (const Kind& kind : kKinds) {

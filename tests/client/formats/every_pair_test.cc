@@ -1,5 +1,5 @@
 // From every format of meshes that is read and written to every other one: no simplex, region, tag or name is lost, but
-// for what a note tells.
+// for losses that a note tells.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -31,7 +31,7 @@ constexpr Kind kKinds[] = {{"vtu", "a.vtu"},   {"vtk", "a.vtk"},    {"npz", "a.n
 
 bool Holds(const Kind& kind, int dimension) { return dimension == 2 || kind.format != std::string_view("2dm"); }
 
-// What a mesh has, in an order of its own: simplices and facets with the number and the name that they have.
+// The content of a mesh, in an order of its own: simplices and facets with the number and the name that they have.
 using Row = std::pair<std::vector<uint32_t>, std::pair<int32_t, std::string>>;
 struct Content {
   std::vector<Row> simplices;
@@ -145,7 +145,7 @@ TEST_F(EveryPairTest, KeepsTheOnlyRegion) {
   }
 }
 
-// In what cannot hold a name, another one stands, and a note says so.
+// In a format that cannot hold a name, another one stands, and a note says so.
 TEST_F(EveryPairTest, NamesThatCannotBeKeptAreToldOf) {
   Mesh mesh = Named(2);
   mesh.boundary[0].name = std::string(700, 'x') + "\xC3\xBC";
@@ -170,7 +170,7 @@ TEST_F(EveryPairTest, NamesThatCannotBeKeptAreToldOf) {
   }
 }
 
-// Formats that are not read back tell of what they leave out.
+// Formats that are not read back tell of the data that they leave out.
 TEST_F(EveryPairTest, LossesAreToldOf) {
   Mesh mesh = Named(2);
   EXPECT_THAT(WriteNoted(mesh, {"su2", "a.su2"}),
@@ -191,7 +191,7 @@ TEST_F(EveryPairTest, LossesAreToldOf) {
   }
 }
 
-// What a file has beside the mesh that is read.
+// Parts of a file that are not read.
 TEST_F(EveryPairTest, WhatIsNotReadIsToldOf) {
   folder_.Write("a.msh",
                 "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n3\n1 0 0 0\n2 1 0 0\n3 0 1 0\n$EndNodes\n"

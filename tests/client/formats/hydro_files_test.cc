@@ -157,7 +157,7 @@ TEST_F(HydroFilesTest, MeshOf2dm) {
   EXPECT_EQ(folder_.Read("b.2dm"),
             "MESH2D\nND 1 0 0 1.5\nND 2 1 0 -2\nND 3 1 1 0\nND 4 0 1 0\nE3T 1 1 2 3 7\nE3T 2 1 3 4 5\n"
             "NS 1 2 -3 1\nNS 3 4 -1 12\n");
-  // What is up in one format is down in the other.
+  // Elevations in one format are depths in the other: the sign changes.
   ASSERT_TRUE(WriteMesh(folder_.Path("b.14"), "", read.View(), {}, &notes).ok());
   EXPECT_THAT(notes, ElementsAre(HasSubstr("no place for regions")));
   EXPECT_THAT(folder_.Read("b.14"), HasSubstr("\n1 0 0 -1.5\n2 1 0 2\n3 1 1 0\n"));
@@ -203,7 +203,7 @@ TEST_F(HydroFilesTest, HeightsThatAreMissingAreTold) {
   EXPECT_THAT(std::string(space.message()), HasSubstr("adcirc holds meshes up to 2-D, and this one is 3-D"));
 }
 
-// What divides two regions is no boundary of ADCIRC's, but a string of .2dm.
+// Edges between two regions are no boundary of ADCIRC's, but a string of .2dm.
 TEST_F(HydroFilesTest, EdgesInsideAreNoBoundary) {
   Mesh mesh{.dimension = 2, .points = {0, 0, 1, 0, 1, 1, 0, 1}, .simplices = {0, 1, 2, 0, 2, 3}};
   mesh.boundary = {{.tag = 1, .name = "", .facets = 4}, {.tag = 2, .name = "fault", .facets = 1}};

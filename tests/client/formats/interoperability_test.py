@@ -1,4 +1,4 @@
-"""Other people's programs read what Wellspace writes, and Wellspace reads what they write; every bit the same."""
+"""Other people's programs read files of Wellspace, and Wellspace reads theirs; every bit the same."""
 import importlib.util
 import os
 import pathlib

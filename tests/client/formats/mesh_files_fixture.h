@@ -1,4 +1,4 @@
-// What tests of files of meshes share: writing, reading what is good and what is bad, and cutting.
+// A fixture for tests of files of meshes: it writes them, reads good and bad ones, and cuts them off.
 #ifndef WELLSPACE_TESTS_CLIENT_FORMATS_MESH_FILES_FIXTURE_H_
 #define WELLSPACE_TESTS_CLIENT_FORMATS_MESH_FILES_FIXTURE_H_
 
@@ -41,7 +41,7 @@ class MeshFilesFixture : public testing::Test {
     return ReadBad(name);
   }
 
-  // A file of `mesh` cut anywhere is refused, or has lost what stands after the mesh.
+  // A file of `mesh` cut anywhere is refused, or has lost only data behind the mesh.
   void ExpectCutAnywhereIsNoTrouble(const Mesh& mesh, const std::string& name, const std::string& format) {
     Write(mesh, name, format);
     const std::string good = folder_.Read(name);

@@ -1,3 +1,4 @@
+// Meshes in VTU, NPZ and .node are read back to the bit; faults leave no file behind.
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -435,7 +436,7 @@ TEST_F(NpzTest, Errors) {
               HasSubstr("mesh.npz: weights.npy: expected 3 weights, one for each point, got 2"));
   EXPECT_THAT(weights_refusal(NpyText("<f8", 1, 2, BytesOf(pair))),
               HasSubstr("weights.npy: expected an array of 1 dimension, got one of 2"));
-  // What a header says is not believed.
+  // The counts of a header are not believed.
   EXPECT_THAT(Refusal(NpyText("<f8", uint64_t{1} << 31, 2, "none"), simplices_), HasSubstr("got 4"));
 }
 

@@ -188,7 +188,7 @@ TEST_F(PointFilesTest, PcdInBinary) {
   ExpectCutAnywhereIsNoTrouble("a.pcd", file);
 }
 
-// Field by field; the bytes are a run, a short reference and a long one that goes on in what it writes.
+// Field by field; the bytes are a run, a short reference and a long one that goes on in its own output.
 TEST_F(PointFilesTest, PcdCompressedByLzf) {
   const std::string header =
       "FIELDS x y\nSIZE 4 4\nTYPE F F\nCOUNT 1 1\nWIDTH 4\nHEIGHT 1\nPOINTS 4\nDATA binary_compressed\n";
@@ -493,7 +493,7 @@ TEST_F(PointFilesTest, StructuredGridsAndBits) {
   ExpectCutAnywhereIsNoTrouble("a.vts", text);
 }
 
-// VTK names components line by line: those without a name are blank lines, which else end what it says of an array.
+// VTK names components line by line: those without a name are blank lines, which else end the lines about an array.
 TEST_F(PointFilesTest, BlankNamesOfComponents) {
   const PointCloud cloud =
       ReadGood("a.vtk",
@@ -559,7 +559,7 @@ TEST_F(PointFilesTest, PaddedPointsAreInThePlane) {
   const PointCloud legacy = ReadGood(
       "a.vtk", "# vtk DataFile Version 3.0\nt\nASCII\nDATASET POLYDATA\nPOINTS 4 float\n0 0 0 1 0 0 0 1 0 1 1 0\n");
   EXPECT_THAT(legacy.points, ElementsAre(0, 0, 1, 0, 0, 1, 1, 1));
-  // Elsewhere somebody has written it.
+  // Elsewhere a program has written it.
   const PointCloud table = ReadGood("a.csv", "0,0,7\n1,0,7\n1,1,7\n0,1,7\n");
   EXPECT_EQ(table.dimension, 3);
   EXPECT_THAT(table.notes, ElementsAre(EndsWith(

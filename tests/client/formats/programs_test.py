@@ -1,4 +1,4 @@
-"""Gmsh, FreeFEM and VTK read what Wellspace writes: the same counts, the same volume; it reads what VTK writes.
+"""Gmsh, FreeFEM and VTK read files of Wellspace: the same counts, the same volume; it reads those of VTK.
 
 Wants python3-vtk9, gmsh and freefem++ (deploy/install-deps.sh interoperability).
 """

@@ -1,4 +1,4 @@
-// What tests of readers of clouds share: a folder, and a cloud or a refusal of a file in it.
+// A fixture for tests of readers of clouds: a folder, and a cloud or a refusal of a file in it.
 #ifndef WELLSPACE_TESTS_CLIENT_FORMATS_READ_CLOUD_FIXTURE_H_
 #define WELLSPACE_TESTS_CLIENT_FORMATS_READ_CLOUD_FIXTURE_H_
 

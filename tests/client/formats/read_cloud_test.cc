@@ -1,3 +1,4 @@
+// Clouds in tables of text and .node: points, columns, and errors that name file and line.
 #include "client/formats/read_cloud.h"
 
 #include <gmock/gmock.h>
@@ -156,7 +157,7 @@ TEST_F(ReadCloudTest, LineOfABinaryFileIsRefusedInBoundedMemory) {
   EXPECT_THAT(ReadBad("cloud.csv", std::string(3 * kMaxLineBytes, '7')), HasSubstr("cloud.csv:1: the line is longer"));
 }
 
-// A pipe hands out what was written in pieces that do not end with a line.
+// A pipe hands the text out in pieces that do not end with a line.
 TEST_F(ReadCloudTest, ReadsPipes) {
   const std::string path = folder_.Path("pipe.csv");
   ASSERT_EQ(mkfifo(path.c_str(), 0600), 0);

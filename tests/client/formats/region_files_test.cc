@@ -155,7 +155,7 @@ TEST_F(RegionFilesTest, TheSquareAsText) {
   EXPECT_THAT(folder_.Read("a.msh"), HasSubstr("$Elements\n2\n1 2 2 7 7 1 2 3\n2 2 2 1 1 2 4 3\n$EndElements"));
 }
 
-// Gmsh counts groups by their dimensions: what has the number of a part of the boundary keeps its own.
+// Gmsh counts groups by their dimensions: a region with the number of a part of the boundary keeps its own.
 TEST_F(RegionFilesTest, RegionWithTheNumberOfAPartKeepsItInMsh) {
   Mesh mesh = Square();
   mesh.facets = {0, 1, 2, 0};
@@ -208,7 +208,7 @@ TEST_F(RegionFilesTest, PiecesMakeTheSameFileAndMissingRegionsNone) {
   }
 }
 
-// What cannot be sought gets the same bytes.
+// A pipe, in which no place can be sought, gets the same bytes.
 TEST_F(RegionFilesTest, PipesGetTheSameBytes) {
   const Mesh mesh = MeshOfRegions(2, true);
   const std::string pipe = folder_.Path("pipe");

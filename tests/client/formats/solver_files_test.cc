@@ -1,4 +1,4 @@
-// What solvers and viewers read that Wellspace does not read back: .su2, .inp, .vtk and .xdmf. That they do read it is
+// Files for solvers and viewers that Wellspace does not read back: .su2, .inp, .vtk and .xdmf. That they do read it is
 // the business of interoperability_test.py and programs_test.py.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

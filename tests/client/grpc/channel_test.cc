@@ -1,3 +1,4 @@
+// Addresses, proxies, tokens and files of TLS for a channel, and the errors of wrong ones.
 #include "client/grpc/channel.h"
 
 #include <cstdlib>
@@ -35,7 +36,7 @@ TEST(OpenChannel, WantsAnAddress) {
   EXPECT_TRUE(Opens("host:1", {}));
 }
 
-// What is wrong with a URL is said, and what would do in its place.
+// The error names the fault of a URL, and the address that would do in its place.
 TEST(OpenChannel, WantsNoUrl) {
   const auto code = absl::StatusCode::kInvalidArgument;
   ExpectError("http://127.0.0.1:7233", {}, code, "expected HOST:PORT without http://, 127.0.0.1:7233");

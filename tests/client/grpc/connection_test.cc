@@ -82,7 +82,7 @@ class FakeServer final : public v1::MeshingService::Service {
   std::unique_ptr<grpc::Server> server_;
 };
 
-// What a client sent.
+// The requests that a client sent.
 struct Upload {
   v1::MeshParameters parameters;
   std::vector<double> points;

@@ -51,7 +51,7 @@ using Unary = std::function<grpc::Status(const Request&, Response&)>;
 template <typename Request, typename Response>
 using Streaming = std::function<grpc::Status(grpc::ServerContext&, const Request&, grpc::ServerWriter<Response>&)>;
 
-// What each call does; those that a test leaves empty are UNIMPLEMENTED.
+// The behaviour of each call; calls that a test leaves empty are UNIMPLEMENTED.
 struct FakeSessions final : v1::SessionService::Service {
   Unary<v1::CreateSessionRequest, v1::CreateSessionResponse> create;
   Unary<v1::GetSessionRequest, v1::GetSessionResponse> get;
@@ -65,6 +65,9 @@ struct FakeSessions final : v1::SessionService::Service {
   std::function<grpc::Status(grpc::ServerContext&, grpc::ServerReader<v1::AddSegmentsRequest>&,
                              v1::AddSegmentsResponse&)>
       add_segments;
+  std::function<grpc::Status(grpc::ServerContext&, grpc::ServerReader<v1::AddTrianglesRequest>&,
+                             v1::AddTrianglesResponse&)>
+      add_triangles;
   std::function<grpc::Status(grpc::ServerContext&, grpc::ServerReader<v1::SetSizesRequest>&, v1::SetSizesResponse&)>
       set_sizes;
   Streaming<v1::DownloadMeshRequest, v1::DownloadMeshResponse> download;
@@ -100,6 +103,10 @@ struct FakeSessions final : v1::SessionService::Service {
   grpc::Status AddSegments(grpc::ServerContext* context, grpc::ServerReader<v1::AddSegmentsRequest>* reader,
                            v1::AddSegmentsResponse* response) override {
     return add_segments(*context, *reader, *response);
+  }
+  grpc::Status AddTriangles(grpc::ServerContext* context, grpc::ServerReader<v1::AddTrianglesRequest>* reader,
+                            v1::AddTrianglesResponse* response) override {
+    return add_triangles(*context, *reader, *response);
   }
   grpc::Status SetSizes(grpc::ServerContext* context, grpc::ServerReader<v1::SetSizesRequest>* reader,
                         v1::SetSizesResponse* response) override {
@@ -170,7 +177,7 @@ struct FakeQueries final : v1::QueryService::Service {
   }
 };
 
-// To be told what to do before the first call.
+// To be given its behaviour before the first call.
 class FakeServer {
  public:
   FakeServer() {

@@ -1,4 +1,4 @@
-// Servers that answer with numbers and text that cannot be: an error, or what does no harm.
+// Servers that answer with numbers and text that cannot be: an error, or no harm.
 #include <cmath>
 #include <limits>
 #include <string>
@@ -48,7 +48,7 @@ TEST(HostileServer, FractionsAreFromZeroToOne) {
   EXPECT_EQ(ended->progress.fraction, 0);
 }
 
-// What answers Locate about one point in 2-D, as it should be.
+// The right answer to Locate about one point in 2-D.
 v1::LocateResponse GoodPlace() {
   v1::LocateResponse response;
   response.add_simplices(3);

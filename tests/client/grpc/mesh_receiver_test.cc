@@ -1,3 +1,4 @@
+// A mesh from its chunks, whole and continued; damaged, early and missing chunks are refused.
 #include "client/grpc/mesh_receiver.h"
 
 #include <cstdint>

@@ -1,11 +1,10 @@
-// Sessions, operations and queries of the client library, and when it tries again.
-#include <cmath>
+// Sessions and operations of the client library, and when it tries again.
 #include <limits>
-#include <numeric>
 #include <set>
 #include <string>
 #include <vector>
 
+#include "client/error_details.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "tests/client/grpc/fake_server.h"
@@ -14,7 +13,6 @@ namespace wellspace::client {
 namespace {
 
 using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 using ::testing::SizeIs;
 
 constexpr char kSession[] = "sessions/one";
@@ -282,176 +280,6 @@ TEST(Operations, AWatchWithoutAnEndIsDataLoss) {
   FakeServer server;
   server.operations.watch = [](grpc::ServerContext&, const auto&, auto&) { return grpc::Status::OK; };
   EXPECT_EQ(server.Client().WatchOperation(kOperation).status().code(), absl::StatusCode::kDataLoss);
-}
-
-// A batch of cells of `vertices`, each a triangle with one neighbour.
-v1::VoronoiCellBatch MakeCells(const std::vector<uint32_t>& vertices) {
-  v1::VoronoiCellBatch cells;
-  for (const uint32_t vertex : vertices) {
-    cells.add_vertices(vertex);
-    cells.add_clip_radii(std::numeric_limits<double>::infinity());
-    cells.add_is_clipped(false);
-    cells.add_node_counts(3);
-    for (int i = 0; i < 6; ++i) {
-      cells.add_nodes(vertex + i);
-    }
-    cells.add_neighbour_counts(1);
-    cells.add_neighbours(vertex + 1);
-  }
-  return cells;
-}
-
-// Answers one vertex a message, and breaks off after so many messages.
-template <typename Request, typename Writer>
-grpc::Status AnswerSome(const Request& request, size_t count, Writer& writer) {
-  v1::VoronoiCellsResponse response;
-  for (size_t i = 0; i < std::min<size_t>(count, request.vertices_size()); ++i) {
-    *response.mutable_cells() = MakeCells({request.vertices(static_cast<int>(i))});
-    writer.Write(response);
-  }
-  return count < static_cast<size_t>(request.vertices_size()) ? Broken() : grpc::Status::OK;
-}
-
-TEST(Queries, GoOnAfterTheLastAnsweredVertex) {
-  FakeServer server;
-  int calls = 0;
-  server.queries.cells = [&calls](grpc::ServerContext&, const v1::VoronoiCellsRequest& request, auto& writer) {
-    ++calls;
-    EXPECT_EQ(request.name(), kSession);
-    return AnswerSome(request, 2, writer);
-  };
-  std::vector<uint32_t> answered;
-  const std::vector<uint32_t> vertices = {9, 3, 7, 1, 5};
-  const absl::Status status = server.Client().VoronoiCells(kSession, vertices, [&answered](const CellBatch& cells) {
-    answered.insert(answered.end(), cells.vertices.begin(), cells.vertices.end());
-    EXPECT_EQ(cells.dimension, 2);
-    EXPECT_THAT(cells.node_counts, ElementsAre(3));
-    EXPECT_FALSE(cells.is_clipped[0]);
-    return absl::OkStatus();
-  });
-  ASSERT_TRUE(status.ok()) << status;
-  EXPECT_EQ(answered, vertices);
-  EXPECT_EQ(calls, 3);
-}
-
-TEST(Queries, ManyVerticesGoInSeveralRequests) {
-  FakeServer server;
-  size_t largest = 0;
-  server.queries.nearest = [&largest](grpc::ServerContext&, const v1::ApproximateNearestNeighborsRequest& request,
-                                      auto& writer) {
-    largest = std::max(largest, request.ByteSizeLong());
-    v1::ApproximateNearestNeighborsResponse response;
-    for (const uint32_t vertex : request.vertices()) {
-      response.add_distances(vertex);
-    }
-    writer.Write(response);
-    return grpc::Status::OK;
-  };
-  std::vector<uint32_t> vertices(300'000);
-  std::iota(vertices.begin(), vertices.end(), 0);
-  std::vector<double> distances;
-  const absl::Status status =
-      server.Client().ApproximateNearestNeighbors(kSession, vertices, [&distances](std::span<const double> batch) {
-        distances.insert(distances.end(), batch.begin(), batch.end());
-        return absl::OkStatus();
-      });
-  ASSERT_TRUE(status.ok()) << status;
-  EXPECT_EQ(distances, std::vector<double>(vertices.begin(), vertices.end()));
-  EXPECT_LT(largest, 1u << 20);
-}
-
-TEST(Queries, OfAllVerticesAreRepeatedOnlyFromTheStart) {
-  FakeServer server;
-  int calls = 0;
-  bool answers_first = false;
-  server.queries.clipped = [&](grpc::ServerContext&, const v1::ClippedVoronoiCellsRequest& request, auto& writer) {
-    ++calls;
-    EXPECT_EQ(request.beta(), 4);
-    EXPECT_TRUE(request.vertices().empty());
-    if (calls == 1 && !answers_first) {
-      return Broken();
-    }
-    v1::ClippedVoronoiCellsResponse response;
-    *response.mutable_cells() = MakeCells({0, 1});
-    writer.Write(response);
-    return calls == 1 ? Broken() : grpc::Status::OK;
-  };
-  size_t cells = 0;
-  const auto count = [&cells](const CellBatch& batch) {
-    cells += batch.vertices.size();
-    return absl::OkStatus();
-  };
-  EXPECT_TRUE(server.Client().ClippedVoronoiCells(kSession, {}, 4, count).ok());
-  EXPECT_EQ(calls, 2);
-  EXPECT_EQ(cells, 2u);
-  calls = 0;
-  answers_first = true;
-  EXPECT_EQ(server.Client().ClippedVoronoiCells(kSession, {}, 4, count), absl::UnavailableError("Socket closed"));
-  EXPECT_EQ(calls, 1);
-}
-
-TEST(Queries, DamagedAnswersAreDataLoss) {
-  using Spoil = void (*)(v1::VoronoiCellBatch&);
-  const std::vector<Spoil> damages = {
-      [](v1::VoronoiCellBatch& cells) { cells.mutable_clip_radii()->RemoveLast(); },
-      [](v1::VoronoiCellBatch& cells) { cells.add_is_clipped(true); },
-      [](v1::VoronoiCellBatch& cells) { cells.mutable_nodes()->RemoveLast(); },
-      [](v1::VoronoiCellBatch& cells) { cells.clear_nodes(); },
-      [](v1::VoronoiCellBatch& cells) { cells.set_node_counts(0, 0xFFFFFFFF); },
-      [](v1::VoronoiCellBatch& cells) { cells.add_neighbours(1); },
-      [](v1::VoronoiCellBatch& cells) { cells.set_neighbour_counts(0, 0xFFFFFFFF); },
-      [](v1::VoronoiCellBatch& cells) { cells.Clear(); },  // too few
-      [](v1::VoronoiCellBatch& cells) {
-        cells = MakeCells({0, 1, 2, 3, 4});
-      },  // too many
-  };
-  const std::vector<uint32_t> vertices = {0, 1};
-  for (size_t i = 0; i < damages.size(); ++i) {
-    FakeServer server;
-    server.queries.cells = [&](grpc::ServerContext&, const auto&, auto& writer) {
-      v1::VoronoiCellsResponse response;
-      *response.mutable_cells() = MakeCells({0, 1});
-      damages[i](*response.mutable_cells());
-      writer.Write(response);
-      return grpc::Status::OK;
-    };
-    EXPECT_EQ(
-        server.Client().VoronoiCells(kSession, vertices, [](const CellBatch&) { return absl::OkStatus(); }).code(),
-        absl::StatusCode::kDataLoss)
-        << i;
-  }
-}
-
-TEST(Queries, ACallbackThatFailsEndsTheCall) {
-  FakeServer server;
-  server.queries.cells = [](grpc::ServerContext&, const v1::VoronoiCellsRequest& request, auto& writer) {
-    return AnswerSome(request, 2, writer);
-  };
-  const std::vector<uint32_t> vertices = {0, 1};
-  EXPECT_EQ(
-      server.Client().VoronoiCells(kSession, vertices, [](const CellBatch&) { return absl::UnavailableError("full"); }),
-      absl::UnavailableError("full"));
-}
-
-TEST(Queries, AddVertices) {
-  FakeServer server;
-  server.queries.add = [](const v1::AddVerticesRequest& request, v1::AddVerticesResponse& response) {
-    EXPECT_THAT(request.points(), ElementsAre(0.5, -0.0));
-    EXPECT_TRUE(std::signbit(request.points(1)));
-    EXPECT_THAT(request.near(), ElementsAre(3));
-    EXPECT_EQ(request.expected_revision(), 6u);
-    EXPECT_FALSE(request.request_id().empty());
-    response.add_vertices(11);
-    response.set_revision(7);
-    return grpc::Status::OK;
-  };
-  CallOptions call;
-  call.expected_revision = 6;
-  const absl::StatusOr<AddedVertices> added =
-      server.Client().AddVertices(kSession, std::vector<double>{0.5, -0.0}, std::vector<uint32_t>{3}, call);
-  ASSERT_TRUE(added.ok()) << added.status();
-  EXPECT_THAT(added->vertices, ElementsAre(11));
-  EXPECT_EQ(added->revision, 7u);
 }
 
 // A server whose DeleteSession fails with `errors`, one after the other, then succeeds.

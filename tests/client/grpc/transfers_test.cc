@@ -22,14 +22,14 @@ using ::testing::HasSubstr;
 
 constexpr char kSession[] = "sessions/one";
 
-// What a session holds, and what came for it.
+// The points of a session, and the calls that came for it.
 struct Uploads {
   std::vector<double> points;
   int breaks_left = 0;  // after so many messages
   uint64_t lost = 0;    // points that it does not admit
   int busy_left = 0;    // calls that find another upload under way
   int calls = 0;
-  int checks = 0;       // of what is there
+  int checks = 0;       // of the points there
   uint64_t resent = 0;  // numbers that came although they were there
   size_t largest_request = 0;
   std::vector<std::string> names = {};
@@ -349,7 +349,7 @@ TEST(Download, ReturnsTheMesh) {
 }
 
 TEST(Download, GoesOnAtTheNextChunkOfTheSameRevision) {
-  // The last is what a server sends ahead of a message that is not read: it has no details.
+  // The last is a status that a server sends ahead of a message that is not read: it has no details.
   for (const grpc::Status& end :
        {Broken(), MakeError(grpc::StatusCode::DEADLINE_EXCEEDED, "the reader stalled", "ERROR_REASON_READER_STALLED"),
         grpc::Status(grpc::StatusCode::DEADLINE_EXCEEDED, "READER_STALLED: the client has not taken a message")}) {

@@ -1,4 +1,4 @@
-"""Arguments: every parameter of the service can be reached, and what is wrong is named with its row."""
+"""Arguments: every parameter of the service can be reached, and errors name the row."""
 
 import inspect
 import os
@@ -8,7 +8,7 @@ import numpy as np
 from support import Case, unit_box
 
 import wellspace.aio
-from wellspace import InvalidArgumentError, _api, _arrays, _client, _domain, _parameters
+from wellspace import InvalidArgumentError, _api, _arrays, _client, _domain, _parameters, _plane, _surface
 
 # Fields of MeshParameters, and the argument with a value for it.
 FIELDS = {
@@ -36,8 +36,8 @@ class ParametersTest(Case):
 
     def test_every_field_has_an_argument(self):
         descriptor = _api.message("MeshParameters").DESCRIPTOR
-        self.assertEqual({field.name for field in descriptor.fields} - {"dimension"}, set(FIELDS))
-        names = {name for name, _, _ in FIELDS.values()} | {"min_angle"}
+        self.assertEqual({field.name for field in descriptor.fields} - {"dimension", "surface"}, set(FIELDS))
+        names = {name for name, _, _ in FIELDS.values()} | {"min_angle"} | set(_parameters.SURFACE_NUMBERS)
         self.assertEqual(names, set(_parameters.Parameters.__annotations__))
         for field, (name, value, expected) in FIELDS.items():
             with self.subTest(name):
@@ -46,6 +46,19 @@ class ParametersTest(Case):
                 self.assertEqual(list(found) if isinstance(expected, list) else found, expected)
                 others = {one.name for one, _ in message.ListFields()} - {"dimension", field}
                 self.assertEqual(others, set(), "nothing else is set")
+
+    def test_what_is_asked_of_a_surface(self):
+        fields = {field.name for field in _api.message("SurfaceParameters").DESCRIPTOR.fields}
+        self.assertEqual(fields - set(_parameters.SURFACE_NUMBERS.values()), {"outside_rho"}, "of no use to users")
+        for name, field in _parameters.SURFACE_NUMBERS.items():
+            with self.subTest(name):
+                message = self.filled(**{name: 0.25})
+                self.assertEqual([(one.name, value) for one, value in message.surface.ListFields()], [(field, 0.25)])
+                self.assertEqual(_parameters.read(message)[name], 0.25)
+        self.assertFalse(self.filled(rho=2).HasField("surface"))
+        message = self.filled(facet_length=0.5, tolerance=0.1)
+        _parameters.fill(message, 3, {"facet_length": float("inf")})
+        self.assertFalse(message.surface.HasField("edge_length"), "infinity takes it back")
 
     def test_parameters_read_back_are_those_given(self):
         given = {name: value for name, value, _ in FIELDS.values()}
@@ -57,11 +70,16 @@ class ParametersTest(Case):
 
     def test_signatures_and_docstrings_have_all(self):
         names = [*_parameters.Parameters.__annotations__]
-        segments = [*_domain.DomainArguments.__annotations__]
-        for function, expected in ((wellspace.mesh, names + segments), (wellspace.estimate, names + segments),
-                                   (wellspace.Client.mesh, names + segments), (wellspace.Session.__init__, names),
+        segments = [*_plane.PlaneArguments.__annotations__]
+        triangles = [*_surface.SurfaceArguments.__annotations__]
+        self.assertEqual(set(_domain.DomainArguments.__annotations__), set(segments) & set(triangles))
+        for function, expected in ((wellspace.mesh, names + segments + triangles),
+                                   (wellspace.estimate, names + segments + triangles),
+                                   (wellspace.Client.mesh, names + segments + triangles),
+                                   (wellspace.Session.__init__, names),
                                    (wellspace.Session.refine, names), (wellspace.Session.add_segments, segments),
-                                   (wellspace.aio.mesh, names + segments)):
+                                   (wellspace.Session.add_triangles, triangles),
+                                   (wellspace.aio.mesh, names + segments + triangles)):
             for name in expected:
                 self.assertIn(name, inspect.signature(function).parameters, function)
         for document in (wellspace.mesh.__doc__, wellspace.Session.__doc__, wellspace.Session.refine.__doc__):
@@ -171,7 +189,7 @@ class ArraysTest(Case):
             ({"crossings": "ignore"}, "'refuse', 'split'", "crossings"),
         ):
             with self.subTest(given), self.fails(InvalidArgumentError, message, field=field):
-                _domain.make_domain(given, 5)
+                _plane.make_plane(given, 5)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Clients: addresses, credentials, what servers say of themselves, errors and their details, bars."""
+"""Clients: addresses, credentials, information about servers, errors and their details, bars."""
 
 import io
 import os
@@ -6,6 +6,7 @@ import pathlib
 import pickle
 import sys
 import tempfile
+import types
 import unittest
 from unittest import mock
 
@@ -183,6 +184,46 @@ class BarTest(Case):
         with mock.patch.object(sys, "stderr", output), mock.patch.dict(sys.modules, {"tqdm": None, "tqdm.auto": None}):
             wellspace.mesh(uniform(1000, 2), progress=True)
         self.assertRegex(output.getvalue(), r"\rdone: 100%, \d+ vertices\n$")
+
+    def test_in_a_notebook(self):
+        """By IPython's protocol alone; here is a kernel's part of it."""
+        shown = []
+
+        class Handle:
+            def update(self, bar):
+                shown.append(bar._repr_html_())
+
+        def display(bar, display_id):
+            shown.append(bar._repr_html_())
+            return Handle() if display_id else None
+
+        shell = types.SimpleNamespace(kernel=object())
+        ipython = types.SimpleNamespace(get_ipython=lambda: shell)
+        modules = {"IPython": ipython, "IPython.display": types.SimpleNamespace(display=display)}
+        with mock.patch.dict(sys.modules, modules):
+            wellspace.mesh(uniform(1000, 2), progress=True)
+            self.assertIn("<progress ", shown[0])
+            self.assertRegex(shown[-1], r"^done: 100%, [\d,]+ vertices$")
+            before = len(shown)
+            shell.kernel = None  # IPython in a terminal
+            output = io.StringIO()
+            with mock.patch.object(sys, "stderr", output):
+                wellspace.mesh(uniform(1000, 2), progress=True)
+            self.assertEqual(len(shown), before)
+            self.assertIn("100%", output.getvalue())
+
+    def test_a_notebook_is_told_the_time_left_and_no_markup(self):
+        shown = []
+        bar = _progress._NotebookBar(lambda one, display_id: shown.append(one._repr_html_()) or bar_handle)
+        bar_handle = types.SimpleNamespace(update=lambda one: shown.append(one._repr_html_()))
+        with mock.patch.object(_progress.time, "monotonic", side_effect=[100.0, 110.0, 110.0]):
+            for fraction in (0.1, 0.3, 1.0):
+                bar.update(_progress.Progress("<b>", 1234, 0, 0, fraction))
+        bar.close()
+        self.assertIn("&lt;b&gt;: 30%, 1,234 vertices, 35 s left", shown[1])
+        self.assertNotIn("left", shown[0] + shown[2])
+        self.assertNotIn("<b>", "".join(shown))
+        self.assertEqual(shown[3], "&lt;b&gt;: 100%, 1,234 vertices")
 
     def test_none(self):
         output = io.StringIO()

@@ -1,4 +1,4 @@
-"""Downloads of what has changed since a mesh: the same mesh to the bit, by a small part of the bytes."""
+"""Downloads of the differences from a mesh: the same mesh to the bit, by a small part of the bytes."""
 
 import asyncio
 import dataclasses
@@ -44,7 +44,7 @@ class DeltaTest(BreakerCase):
         session.refine()
 
     def counted(self, call, **arguments):
-        """What a download brings, how many bytes it takes, and in how many calls."""
+        """The result of a download, its bytes, and the number of its calls."""
         self.bytes, self.requests = 0, []
         return call(**arguments), self.bytes, len(self.requests)
 
@@ -100,7 +100,7 @@ class DeltaTest(BreakerCase):
         mesh, _, calls = self.counted(session.download, since=before, boundary=False)
         self.assertEqual(calls, 1)
         self.assert_same(mesh, session.download(boundary=False))
-        # A mesh without it does not become one with it by what has changed.
+        # A mesh without it does not become one with it by differences.
         mesh, _, calls = self.counted(session.download, since=before)
         self.assertFalse(self.requests[0].since_revision)
         self.assert_same(mesh, session.download())

@@ -1,4 +1,4 @@
-"""What documents, docstrings and examples show is run."""
+"""The code in documents, docstrings and examples is run."""
 
 import ast
 import asyncio
@@ -57,14 +57,14 @@ class DocumentsTest(unittest.TestCase):
         self.run_blocks(ROOT / "README.md", 1)
 
     def test_readmes_need_no_other_packages(self):
-        """What is read first runs with what the package needs, without what it only suggests."""
+        """The first documents run with the packages that are needed, without those that are only suggested."""
         hidden = {name: None for name in ("meshio", "pyvista", "tqdm", "tqdm.auto", "scipy")}
         with mock.patch.dict(sys.modules, hidden):
             self.run_blocks(ROOT / "client" / "python" / "README.md", 1)
             self.run_blocks(ROOT / "README.md", 1)
 
     def test_docstrings(self):
-        """Their examples run; what they show is not compared."""
+        """Their examples run; their output is not compared."""
         found = 0
         for module in pkgutil.iter_modules(wellspace.__path__, "wellspace."):
             imported = importlib.import_module(module.name)

@@ -17,7 +17,7 @@ def shoelace(nodes):
 
 class DualTest(Case):
     def check(self, mesh, tolerance=1e-12):
-        """What holds for every mesh."""
+        """Checks the laws that hold for every mesh."""
         dual = mesh.dual_cells()
         self.assertAlmostEqual(dual.volumes.sum(), volume(mesh) / (2 if mesh.dimension == 2 else 6), delta=tolerance)
         self.assertGreater(dual.volumes.min(), 0)

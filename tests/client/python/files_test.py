@@ -1,7 +1,9 @@
 """Meshes in files and as objects of other packages, against the tool and meshio."""
 
 import json
+import os
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -15,6 +17,7 @@ from support import PATIENCE, TOOL, Case, spot, uniform, unit_box
 
 import wellspace
 from wellspace import InvalidArgumentError, MissingPackageError
+from wellspace._tool import MESH_FORMATS as FORMATS
 
 SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
 RING = [[0, 1], [1, 2], [2, 3], [3, 0]]
@@ -117,6 +120,53 @@ class FilesTest(Case):
         with self.fails(InvalidArgumentError, ".npz takes no options", field="binary"):
             mesh.save(path, binary=True)
 
+    def test_what_the_tool_writes_to_the_byte(self):
+        outlet = wellspace.mesh(SQUARE, segments=RING, markers=[7, 7, 0, 0], regions=[(0.5, 0.5, 4)], edge_length=0.3)
+        for mesh in (wellspace.mesh(spot(), size=0.4), outlet, wellspace.mesh(uniform(30, 3), pump_weights=True)):
+            mesh.save(self.folder / "mesh.npz")
+            for suffix in sorted(FORMATS):
+                if suffix in (".14", ".grd", ".2dm") and mesh.points.shape[1] == 3:
+                    continue
+                with self.subTest(suffix, d=mesh.points.shape[1]):
+                    (self.folder / "own").mkdir(exist_ok=True)
+                    self.tool("convert", self.folder / "mesh.npz", self.folder / f"mesh{suffix}")
+                    mesh.save(self.folder / "own" / f"mesh{suffix}")
+                    for file in (self.folder / "own").iterdir():
+                        self.assertEqual(file.read_bytes(), (self.folder / file.name).read_bytes(), file.name)
+                        file.unlink()
+
+    def test_the_formats_are_all_of_the_tool(self):
+        manual = self.tool("manual", "--format", "markdown").split("### `wellspace convert")[1].replace("\\|", "|")
+        told = re.search(r"--format ([a-z0-9|]+)", manual).group(1).split("|")
+        of_names = {"msh41": ".msh", "msh22": ".msh", "medit": ".mesh", "abaqus": ".inp", "adcirc": ".14"}
+        self.assertEqual({of_names.get(name, "." + name) for name in told}, FORMATS - {".grd"} | {".npz"})
+
+    def test_meshes_of_other_formats_are_read(self):
+        mesh = wellspace.mesh(SQUARE, segments=RING, markers=[7, 7, 0, 0], regions=[(0.5, 0.5, 4)], edge_length=0.3)
+        for suffix in (".vtu", ".msh", ".mesh", ".vtk"):
+            mesh.save(self.folder / f"mesh{suffix}")
+            loaded = wellspace.Mesh.load(self.folder / f"mesh{suffix}")
+            np.testing.assert_array_equal(loaded.points, mesh.points, suffix)
+            np.testing.assert_array_equal(loaded.simplices, mesh.simplices, suffix)
+            self.assertEqual(sorted(loaded.facet_names.values()), sorted(mesh.facet_names.values()), suffix)
+
+    def test_errors_of_the_tool(self):
+        mesh = wellspace.mesh(uniform(50, 3))
+        with self.fails(InvalidArgumentError, "2-D", field="path"):
+            mesh.save(self.folder / "mesh.2dm")
+        with self.assertRaises(FileNotFoundError):
+            mesh.save(self.folder / "none" / "mesh.vtu")
+        with self.assertRaises(FileNotFoundError):
+            wellspace.Mesh.load(self.folder / "none.vtu")
+        (self.folder / "wrong.msh").write_text("$MeshFormat\nno\n")
+        with self.fails(InvalidArgumentError, "wrong.msh", field="path"):
+            wellspace.Mesh.load(self.folder / "wrong.msh")
+        self.assertEqual([file.name for file in self.folder.iterdir()], ["wrong.msh"])
+        with mock.patch.dict(os.environ, {"WELLSPACE_TOOL_BINARY": str(self.folder / "no-tool")}):
+            with self.fails(MissingPackageError, "WELLSPACE_TOOL_BINARY"):
+                wellspace.Mesh.load(self.folder / "wrong.msh")
+
+    @mock.patch.dict(os.environ, {"WELLSPACE_TOOL_BINARY": "/nowhere"})
     def test_meshio(self):
         for mesh, kinds in ((wellspace.mesh(uniform(50, 2), box=unit_box(2)), ("triangle", "line")),
                             (wellspace.mesh(uniform(50, 3), box=unit_box(3)), ("tetra", "triangle"))):
@@ -149,8 +199,9 @@ class FilesTest(Case):
 
     def test_packages_that_are_not_installed(self):
         mesh = wellspace.mesh(uniform(5, 2))
-        with mock.patch.dict(sys.modules, {"meshio": None, "pyvista": None}):
-            with self.fails(MissingPackageError, "meshio is needed to write .vtu"):
+        without = mock.patch.dict(os.environ, {"WELLSPACE_TOOL_BINARY": "/nowhere"})
+        with without, mock.patch.dict(sys.modules, {"meshio": None, "pyvista": None}):
+            with self.fails(MissingPackageError, "meshio is needed or the tool wellspace on the path, to write .vtu"):
                 mesh.save(self.folder / "mesh.vtu")
             with self.fails(MissingPackageError, "meshio is needed for to_meshio"):
                 mesh.to_meshio()
@@ -161,7 +212,7 @@ class FilesTest(Case):
             mesh.to_pyvista()
 
     def test_pyvista(self):
-        """Against what pyvista is documented to take: it is no package of Debian 12."""
+        """Against the documented arguments of pyvista: it is no package of Debian 12."""
 
         class UnstructuredGrid:
             def __init__(self, cells, celltypes, points):

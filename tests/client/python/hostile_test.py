@@ -1,4 +1,4 @@
-"""Servers that answer with numbers and text that cannot be: an error, or what does no harm."""
+"""Servers that answer with numbers and text that cannot be: an error, or no harm."""
 
 import contextlib
 import io

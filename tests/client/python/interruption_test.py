@@ -91,7 +91,7 @@ class InterruptionTest(Case):
             self.assertEqual(after.parameters, before.parameters)
 
     def test_the_next_call_after_ctrl_c(self):
-        """What was given up has ended when the call has: the session is not busy."""
+        """The work of an interrupted call has ended when the call has: the session is not busy."""
         with wellspace.Session(3, server=self.client, box=unit_box(3)) as session:
             session.upload(uniform(10, 3))
             session.refine()

@@ -160,7 +160,7 @@ class MeshReceiverTest(Case):
             receiver.set_metadata(bytes_of(metadata(revision=5)))
 
     def test_bytes_of_every_kind(self):
-        """Whatever comes, the error is one of the package."""
+        """Any bytes give an error of the package, or none."""
         random = np.random.default_rng(5)
         outcomes = []
         for good, take in (

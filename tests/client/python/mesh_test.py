@@ -1,4 +1,4 @@
-"""Meshes in one call: what comes back is right, and what is asked for holds."""
+"""Meshes in one call: results are right, and the demands hold."""
 
 import unittest
 

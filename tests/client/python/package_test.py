@@ -87,7 +87,10 @@ class PackageTest(unittest.TestCase):
 
     def test_version_is_that_of_the_project(self):
         cmake = (ROOT / "CMakeLists.txt").read_text(encoding="utf-8")
-        self.assertIn(f"project(wellspace VERSION {self.wheel.name.split('-')[1]} ", cmake)
+        version = self.wheel.name.split("-")[1]
+        self.assertIn(f"project(wellspace VERSION {version} ", cmake)
+        released = re.search(r"^## \[(\d.*)\] - ", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)
+        self.assertEqual(released[1], version, "the last release of CHANGELOG.md")
 
     def test_installed_by_pip_into_an_environment(self):
         environment = self.folder / "environment"

@@ -1,4 +1,4 @@
-"""Connections that break: what was interrupted is made again once, and goes on where it was."""
+"""Connections that break: interrupted calls are made again once, and go on where they were."""
 
 import unittest
 
@@ -163,7 +163,7 @@ class ResumeTest(BreakerCase):
         np.testing.assert_array_equal(mesh.points[mesh.input_vertices], points)
 
     def wait_for_points(self, name, count):
-        """Until the server itself has as many: what it has received stays."""
+        """Until the server itself has as many: the points received stay."""
         session = wellspace.Session.attach(name, server=self.server)
         while session.info().point_count < count:
             pass

@@ -64,7 +64,7 @@ class RetrierTest(unittest.TestCase):
         self.token = CancelToken()
 
     def run_with(self, *outcomes, deadline=math.inf):
-        """Attempts end with these, one after the other: an exception, or (exception, what is set of the attempt)."""
+        """Attempts end with these, one after the other: an exception, or (exception, attributes set of the attempt)."""
         left = list(outcomes)
 
         def attempt_once(attempt):

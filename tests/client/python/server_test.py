@@ -98,7 +98,7 @@ class LocalServerTest(Case):
         return server
 
     def test_the_first_call_after_a_crash(self):
-        """It gets another server, whoever makes it: a function, or a client from before."""
+        """It gets another server, made by a function or by a client from before."""
         client = Client()
         points = uniform(10, 2)
         for call in (lambda: wellspace.mesh(points), lambda: wellspace.estimate(points), lambda: client.mesh(points),
@@ -117,7 +117,7 @@ class LocalServerTest(Case):
                 session.info()
 
     def test_a_crash_in_the_work_is_not_tried_again(self):
-        """The call may be what ends servers."""
+        """The call may be the cause of the crash."""
         first = []
 
         def on_progress(progress):
@@ -197,7 +197,7 @@ input()
         process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         line, child = process.stdout.readline(), int(process.stdout.readline())
         try:
-            os.kill(child, signal.SIGSTOP)  # it lives on, with what it has of the parent's files
+            os.kill(child, signal.SIGSTOP)  # it lives on, with its copies of the parent's files
             process.kill()
             process.wait(PATIENCE)
             self.gone(line)

@@ -1,4 +1,4 @@
-"""The life of a session: what is uploaded, refined, added, asked and downloaded."""
+"""The life of a session: uploads, refinements, additions, queries and downloads."""
 
 import datetime
 import math
@@ -272,10 +272,29 @@ class ZeroTest(Case):
             self.assertEqual(session.info().revision, mesh.revision)
 
     def test_more_points_than_a_request_has(self):
+        side = np.linspace(0.01, 0.99, 400)
+        cloud = np.stack(np.meshgrid(side, side), -1).reshape(-1, 2)  # 160 000 points take two requests
         with wellspace.Session(2, box=unit_box(2)) as session:
             session.refine()
-            with self.fails(InvalidArgumentError, "300000 take 4800005 bytes in one request", field="points"):
-                session.add(np.full((300_000, 2), 0.5))
+            before = session.info().revision
+            vertices = session.add(cloud, expected_revision=before)
+            self.assertEqual(len(np.unique(vertices)), len(cloud))
+            self.assertEqual(session.info().revision, before + 2)
+            wrong = cloud + 0.0003
+            wrong[-1] = 2
+            with self.fails(InvalidArgumentError, "points[159999] = (2, 2) lies outside") as told:
+                session.add(wrong)
+            self.assertIn("of 160000 points were added before", str(told.exception))
+            wrong[-1] = wrong[0]
+            again = session.add(wrong)  # those of the first request are vertices already
+            self.assertEqual(len(np.unique(again)), len(cloud) - 1)
+            self.assertEqual(again[-1], again[0])
+            session.refine()
+            mesh = session.download()
+            self.assertTrue((mesh.points[vertices] == cloud).all())
+            self.assertTrue((mesh.points[again] == wrong).all())
+            with self.fails(ConflictError, reason="REVISION_MISMATCH"):
+                session.add(cloud, expected_revision=before)
 
 
 if __name__ == "__main__":

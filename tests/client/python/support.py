@@ -53,7 +53,7 @@ class Case(unittest.TestCase):
 
     @contextlib.contextmanager
     def fails(self, kind, message="", **attributes):
-        """The block raises `kind`, with `message` in what it says, and with these attributes."""
+        """The block raises `kind`, with `message` in its text, and with these attributes."""
         with self.assertRaises(kind) as caught:
             yield caught
         self.assertIn(message, str(caught.exception))

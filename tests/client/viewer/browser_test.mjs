@@ -1,4 +1,4 @@
-// Pages of `wellspace view` in Chromium: what they show, that they ask for nothing and obey no name, and who can use
+// Pages of `wellspace view` in Chromium: their display, that they ask for nothing and obey no name, and who can use
 // them. Wants the packages of tests/node and the programs of WELLSPACE_BIN_DIR.
 
 import assert from "node:assert/strict";
@@ -221,7 +221,7 @@ test("a mesh of triangles is a map", async () => {
     await page.mouse.move(x, y);
     const place = (await text(page, "#readout")).replace(/−/g, "-").split(",").map(Number);
     assert.ok(Math.abs(place[0] - 17) < 20 && Math.abs(place[1] + 5) < 20, place.join());
-    // What is below the pointer stays there.
+    // The place below the pointer stays there.
     await page.mouse.wheel(0, -600);
     await page.waitForTimeout(100);
     await page.mouse.move(x + 1, y);

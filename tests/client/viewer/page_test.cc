@@ -1,3 +1,4 @@
+// Pages hold the data of their mesh and nothing that runs; meshes that cannot be shown are refused.
 #include "client/viewer/page.h"
 
 #include <gmock/gmock.h>
@@ -84,7 +85,7 @@ TEST_F(PageTest, HasTheMesh) {
   EXPECT_EQ(ArrayOf<double>(page, "mesh-field1"), weights);
 }
 
-// Larger than one piece of what is written.
+// Larger than one piece of the output.
 TEST_F(PageTest, HasLongArrays) {
   formats::Mesh mesh;
   mesh.dimension = 2;
@@ -115,7 +116,7 @@ TEST_F(PageTest, NamesAreNeverMarkup) {
   for (const char byte : text) {
     EXPECT_TRUE(byte >= ' ' && byte < '\x7f') << static_cast<int>(byte);
   }
-  // What is no UTF-8 gives U+FFFD.
+  // Bytes that are no UTF-8 give U+FFFD.
   const nlohmann::json header = nlohmann::json::parse(text);
   EXPECT_EQ(header["name"], "</script><script>alert(1)</script><!--\ufffd\ufffd\n\x7f\"'&");
   EXPECT_EQ(header["name"], header["boundary"][0]["name"]);

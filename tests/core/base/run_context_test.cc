@@ -1,3 +1,4 @@
+// Reasons to stop, progress and phases of a run, also with threads that race.
 #include "core/base/run_context.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// Loops that threads share: each call is made once, and what the calls write is seen after.
+// Loops that threads share: each call is made once, and the writes of calls are seen after.
 #include "core/base/thread_team.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// What cells in the plane and in space do otherwise than those beyond; polytope_test.cc has what all do.
+// Cells in the plane and in space, where they differ from those beyond; polytope_test.cc has the tests for all.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -315,7 +315,7 @@ TYPED_TEST(FloatCellsTest, ManyNodesComeAndGo) {
   }
 }
 
-// Far below what floats can tell from the site, all is decided exactly.
+// Far below distances from the site that floats can tell, all is decided exactly.
 TYPED_TEST(FloatCellsTest, VerticesMayBeVeryNear) {
   constexpr int D = TypeParam::kValue;
   std::vector<Point<D>> unscaled(1, Point<D>{});

@@ -1,4 +1,4 @@
-// What is gathered around sites, against all vertices.
+// Vertices gathered around sites, against all vertices.
 #include "core/cell/gathered_vertices.h"
 
 #include <gtest/gtest.h>

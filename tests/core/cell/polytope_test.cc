@@ -215,7 +215,7 @@ TYPED_TEST(PolytopeTest, CosphericalVerticesGiveOneCellInAnyOrder) {
   }
 }
 
-// What is cut by approximate positions alone, and placed at the end, is the cell to the bit.
+// A cell that is cut by approximate positions alone, and placed at the end, is the same to the bit.
 TYPED_TEST(PolytopeTest, WhenNodesArePlacedMakesNoDifference) {
   constexpr int D = TypeParam::kValue;
   const auto description = [](const Polytope<D>& cell) {

@@ -27,7 +27,7 @@ constexpr double kClip = 0.4;
 // Without ties, and with many.
 constexpr std::string_view kKinds[] = {"uniform", "grid", "cospherical", "boundary", "rounded"};
 
-// All that counts of a node: where it is, to the bit, and what its planes are; in an order of its own.
+// All that counts of a node: its position, to the bit, and its planes; in an order of its own.
 template <int D>
 auto Description(const Polytope<D>& cell) {
   using Generators = std::vector<std::tuple<VertexId, PlaneKind, uint8_t>>;
@@ -182,7 +182,7 @@ TYPED_TEST(SameCellsTest, ThoseOfManySitesAreThoseOfEach) {
     }
     std::vector<VertexId> sites = LeafByLeaf<D>(structure);
     ASSERT_EQ(sites.size(), structure.vertex_count());
-    sites.push_back(sites.front());  // again, and apart from what is near it
+    sites.push_back(sites.front());  // again, and apart from its neighbours
     for (const double beta : {1.5, 4.0, std::numeric_limits<double>::infinity()}) {
       SCOPED_TRACE(beta);
       for (const TieRule rule : {TieRule::kKeep, TieRule::kPerturb}) {

@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "core/domain_cloud.h"
 #include "core/estimate/estimate.h"
-#include "core/mesher.h"
+#include "core/input/domain_cloud.h"
+#include "core/meshers/mesher.h"
 #include "tests/core/domain_input.h"
 
 namespace wellspace::core {
@@ -147,7 +147,7 @@ TEST(DomainEstimateTest, WorkGrowsAsTheSegmentsDo) {
   }
 }
 
-// What no mesh of any size could be is estimated all the same, and is not put into a tree of that size.
+// A mesh that is too large for any memory is estimated all the same, and is not put into a tree of that size.
 TEST(DomainEstimateTest, NestedRingsThatNoMemoryHoldsAreEstimated) {
   const DomainInput input = NestedSquares(5'000);
   RunContext context;

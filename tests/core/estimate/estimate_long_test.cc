@@ -1,5 +1,5 @@
 // The estimate against the meshes themselves, on the clouds of bench/sizes and on others; docs/design/estimate.md says
-// which of them the model was fitted to, and what is left out.
+// which of them the model was fitted to, and which are left out.
 #include <gtest/gtest.h>
 #include <malloc.h>
 #include <sys/resource.h>
@@ -19,13 +19,13 @@
 #include <string_view>
 #include <vector>
 
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "tests/support/clouds.h"
 
 namespace wellspace::core {
 namespace {
 
-// What the process has allocated is more than the mesh's under a sanitizer.
+// Under a sanitizer the process allocates more than the memory of the mesh.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr bool kMeasuresMemory = false;
 #else
@@ -117,7 +117,7 @@ Cloud Unseen(std::string_view kind, int dimension, size_t n) {
   return cloud;
 }
 
-// What meshing makes, in a process of its own, so that the peak of its memory is that of this mesh.
+// The figures of a mesh that a process of its own makes, so that the peak of its memory is that of this mesh.
 struct Made {
   double vertices = 0;
   double simplices = 0;
@@ -135,7 +135,7 @@ std::optional<Made> MakeMesh(const MeshParameters& parameters, const Cloud& clou
   if (pipe(ends.data()) != 0) {
     return std::nullopt;
   }
-  malloc_trim(0);  // what this process has freed would serve the child
+  malloc_trim(0);  // memory that this process has freed would serve the child
   const pid_t child = fork();
   if (child == 0) {
     RunContext context;

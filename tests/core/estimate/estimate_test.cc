@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "core/estimate/nearest_points.h"
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "tests/support/brute_force.h"
 #include "tests/support/clouds.h"
 #include "tests/support/structures.h"

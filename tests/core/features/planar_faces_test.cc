@@ -1,4 +1,4 @@
-// Faces of planar graphs: holes, nesting, seeds, rules, and what is refused.
+// Faces of planar graphs: holes, nesting, seeds, rules, and refusals.
 #include "core/features/planar_faces.h"
 
 #include <gmock/gmock.h>
@@ -25,7 +25,7 @@ struct Drawing {
   std::vector<double> points;
   std::vector<uint32_t> ends;
   std::vector<uint8_t> is_open;
-  std::vector<uint32_t> groups;  // what comes next is of `group`
+  std::vector<uint32_t> groups;  // the next segments are of `group`
   uint32_t group = 0;
   std::vector<FaceSeed> seeds;
   FaceRule rule = FaceRule::kHoles;

@@ -1,4 +1,4 @@
-// Segments become a planar graph: what is dropped, what is split, what is refused, and in which words.
+// Segments become a planar graph: those that are dropped, split or refused, and the words of the errors.
 #include "core/features/planar_graph.h"
 
 #include <gmock/gmock.h>
@@ -112,8 +112,8 @@ TEST(PlanarGraphTest, SegmentsThatOverlapShareWhatTheyHaveInCommon) {
 TEST(PlanarGraphTest, ACrossingIsRefusedWithBothSegmentsAndThePlace) {
   const auto graph = Input{.points = {0, 0, 2, 2, 0, 2, 2, 0}, .ends = {0, 1, 2, 3}}.Make();
   EXPECT_EQ(graph.status().code(), absl::StatusCode::kInvalidArgument);
-  EXPECT_THAT(graph.status().message(),
-              AllOf(HasSubstr("segments[0] and segments[1] cross at (1, 1)"), HasSubstr("split there")));
+  EXPECT_THAT(graph.status().message(), AllOf(HasSubstr("segments[0] and segments[1] cross at (1, 1)"),
+                                              HasSubstr("or be split there by the rule of crossings \"split\"")));
 }
 
 TEST(PlanarGraphTest, ManyCrossingsAreCountedAndTenNamed) {

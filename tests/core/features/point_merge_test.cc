@@ -1,4 +1,4 @@
-// Which points are one: equal ones, and corners of rings that are nearer to each other than doubles serve.
+// Points that become one: equal ones, and corners of rings that are nearer to each other than doubles serve.
 #include "core/features/point_merge.h"
 
 #include <gtest/gtest.h>

@@ -183,7 +183,7 @@ TEST_F(SolidsTest, AnOpenSurfaceBoundsNothing) {
   EXPECT_EQ(found.solids.membranes, surface.triangle_count());
 }
 
-// Which solid holds a point is decided twice: by the first triangle below it, and by how many are.
+// The solid that holds a point is decided twice: by the first triangle below it, and by their number.
 TEST_F(SolidsTest, SolidsOfPointsAreThoseOfRays) {
   for (const test::NamedComplex& given : test::SevenComplexes()) {
     const Found found = Find(given.surface);

@@ -1,4 +1,4 @@
-// Triangles become a complex: what is dropped, in which order it is, and what it does not depend on.
+// Triangles become a complex: those that are dropped, its order, and input orders that it does not depend on.
 #include "core/features/surface_complex.h"
 
 #include <gmock/gmock.h>

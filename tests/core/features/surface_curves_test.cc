@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/acute_parts.h"
 #include "tests/support/seeded_test.h"
 #include "tests/support/surfaces.h"
 
@@ -145,6 +146,13 @@ TEST(SurfaceCurvesTest, SmallPatchesStayWhereCreasesAreStrongOrMarkersChange) {
   test::TestSurface marked = Bump(0);
   marked.markers[400] = 1;
   EXPECT_EQ(Find(marked, kCrease, 0.2).curves.patch_count, 2u);
+}
+
+// The upper side of a wing goes over into the lower one in front; at the back they meet in an edge.
+TEST(SurfaceCurvesTest, ALongSharpEdgeStaysThoughOnePatchGoesAround) {
+  const test::TestSurface wing = test::Wing(40);
+  EXPECT_THAT(Find(wing, kCrease, 0.01).Counts(), ElementsAre(3, 2, 3));
+  EXPECT_THAT(Find(wing, kCrease, 1).Counts(), ElementsAre(2, 2, 3));  // an edge shorter than 5 is a fragment then
 }
 
 TEST(SurfaceCurvesTest, At180DegreesMarkersAndBordersAloneMakeCurves) {

@@ -1,4 +1,4 @@
-// What a complex is like as a whole: open loops, branchings, flipped triangles, sharpness.
+// The shape of a complex as a whole: open loops, branchings, flipped triangles, sharpness.
 #include "core/features/surface_shape.h"
 
 #include <gmock/gmock.h>

@@ -38,7 +38,7 @@ Rational Determinant(const RationalPoint& o, const RationalPoint& a, const Ratio
 
 Sign SignOf(const Rational& x) { return x < 0 ? Sign::kNegative : x > 0 ? Sign::kPositive : Sign::kZero; }
 
-// How far along the segment from p to q a triangle is crossed, if it is.
+// The place along the segment from p to q where it crosses a triangle, if it does.
 std::optional<Rational> CrossedAt(const Triangle& triangle, const Point<3>& p, const Point<3>& q) {
   const RationalPoint a = Unmoved(triangle[0]);
   const RationalPoint b = Unmoved(triangle[1]);
@@ -68,7 +68,7 @@ class TriangleCrossingTest : public test::SeededTest {
  protected:
   TriangleCrossingTest() : SeededTest(11'803) {}
 
-  // Of a grid of few points, so that most of what can coincide does.
+  // Of a grid of few points, so that most things that can coincide do.
   Point<3> GridPoint(uint64_t size) {
     return {static_cast<double>(random_.Below(size)), static_cast<double>(random_.Below(size)),
             static_cast<double>(random_.Below(size))};

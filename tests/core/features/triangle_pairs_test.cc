@@ -62,7 +62,7 @@ class TrianglePairsTest : public test::SeededTest {
 };
 
 TEST_F(TrianglePairsTest, NeedlesAreLostNowhere) {
-  // Each with a small triangle around a point near its end: planes of needles are turned by what is rounded.
+  // Each with a small triangle around a point near its end: planes of needles are turned by rounding.
   for (const double width : {1e-4, 1e-8, 1e-12}) {
     test::TestSurface surface;
     for (int i = 0; i < 200; ++i) {

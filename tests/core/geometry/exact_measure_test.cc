@@ -1,3 +1,4 @@
+// Signs and volumes against integers of many bits, in all dimensions and at all scales.
 #include "core/geometry/exact_measure.h"
 
 #include <gtest/gtest.h>
@@ -278,7 +279,7 @@ TYPED_TEST(ExactMeasureTest, VolumeValue) {
   sum.Add(simplex);
   sum.Add(simplex);
   EXPECT_DOUBLE_EQ(sum.value(), -volume);
-  // A coarse sum stays what it is when a much finer term joins it.
+  // A coarse sum stays the same when a much finer term joins it.
   for (Point<D>& p : simplex) {
     for (double& x : p) {
       x *= 0x1p-100;
@@ -311,7 +312,7 @@ TYPED_TEST(ExactMeasureTest, CircumcentreOffsets) {
 }
 
 TEST(ExactMeasure, ProductsThatUnderflowDoNotDecideInSpace) {
-  // The last edge is so long that what underflows in the product of the others counts more than what does not.
+  // The last edge is so long that the part of the others' product that underflows counts more than the rest.
   const double tiny = 0x1p-540;
   for (const double tilt : {-0x1p-700, 0.0, 0x1p-700}) {
     const Simplex<3> simplex = {Point<3>{0, 0, 0}, Point<3>{tiny, 0, tilt}, Point<3>{0, tiny, 1},

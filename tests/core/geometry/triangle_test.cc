@@ -86,7 +86,7 @@ TEST_F(TriangleTest, BoxesWithAPointOfATriangleAreNotMissed) {
 }
 
 TEST_F(TriangleTest, BoxesWithACornerOfANeedleAreNotMissed) {
-  // Planes of needles are turned by what is rounded.
+  // Planes of needles are turned by rounding.
   for (int round = 0; round < 20000; ++round) {
     const double width = std::pow(10.0, -3 - 12 * random_.Unit());
     const double share = random_.Unit();

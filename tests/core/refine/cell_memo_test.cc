@@ -1,4 +1,4 @@
-// What is remembered of a cell is rounded to the safe side, and an edge is not taken for a radius.
+// The memo of a cell is rounded to the safe side, and an edge is not taken for a radius.
 #include "core/refine/cell_memo.h"
 
 #include <gtest/gtest.h>

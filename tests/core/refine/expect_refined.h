@@ -1,4 +1,4 @@
-// What a refinement promises of a cell, seen by a look at all vertices.
+// The guarantee of a refinement for a cell, seen by a look at all vertices.
 #ifndef WELLSPACE_TESTS_CORE_REFINE_EXPECT_REFINED_H_
 #define WELLSPACE_TESTS_CORE_REFINE_EXPECT_REFINED_H_
 
@@ -15,7 +15,7 @@
 
 namespace wellspace::test {
 
-// What Refinement promises of the whole cell of `v` under radius-edge, computed by a look at all vertices; ties are
+// Expects the guarantee of Refinement for the whole cell of `v` under radius-edge, by a look at all vertices; ties are
 // perturbed, as they are for the simplices.
 template <int D>
 void ExpectRefined(const core::QueryStructure<D>& structure, core::VertexId v, double rho, core::Polytope<D>& cell) {

@@ -165,7 +165,7 @@ TYPED_TEST(RefineTest, VerticesAreNoCloserThanFeaturesAskFor) {
   }
 }
 
-// Guarantee (1): what a bucket adds is no closer to what is there than the bucket's edges allow, as long as nothing is
+// Guarantee (1): vertices of a bucket are no closer to others than the bucket's edges allow, as long as nothing is
 // snapped; a projection on up to D faces shortens its empty radius by at most sqrt 2 each.
 TYPED_TEST(RefineTest, NewVerticesAreAsFarApartAsTheBucketSays) {
   constexpr int D = TypeParam::kValue;
@@ -438,8 +438,8 @@ TEST(ScheduleTest, WhatIsDetachedIsPendingUntilItIsTakenOrReattached) {
   EXPECT_TRUE(schedule.Detach(3).empty()) << "6 has moved on";
 }
 
-// By blocks of numbers, what is new in that of its neighbour; the last come first in each, and before all of them what
-// comes later.
+// Vertices come by blocks of numbers, new ones in the block of their neighbour. The last of a block come first, and
+// vertices of a lower bucket before all.
 TEST(ScheduleTest, BucketsArePutInOrderByBlocksOnce) {
   constexpr uint32_t kBlocks = 5;
   constexpr uint32_t kCount = kBlocks * Schedule::kBlockSize;

@@ -1,4 +1,4 @@
-// Sizes in boxes and at points: what the tree finds is what a look at all of them finds, to the bit.
+// Sizes in boxes and at points: the size found by the tree is that of a look at all of them, to the bit.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -47,7 +47,7 @@ struct Sizes {
     shuffle(samples);
   }
 
-  // The squares of what is asked for at `x`; the least within `reach` of it.
+  // The squares of the sizes asked for at `x`; the least within `reach` of it.
   double AtSq(const Point<D>& x) const {
     double least = everywhere * everywhere;
     for (const auto& [box, size] : regions) {

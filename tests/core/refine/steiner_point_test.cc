@@ -1,4 +1,4 @@
-// Where new vertices go.
+// The places of new vertices.
 #include "core/refine/steiner_point.h"
 
 #include <gtest/gtest.h>

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "core/geometry/exact_measure.h"
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "core/validate/validate_boundary.h"
 #include "tests/support/clouds.h"
 #include "tests/support/parameters.h"
@@ -87,7 +87,7 @@ std::set<std::vector<uint32_t>> FacetsOfOneSimplex(const Mesh& mesh) {
   return facets;
 }
 
-// What the facets of `face` cover of it, less its own area, without rounding: 0 unless they overlap or leave gaps.
+// The area that the facets of `face` cover, less its own, without rounding: 0 unless they overlap or leave gaps.
 template <int D>
 double ExcessArea(const Mesh& mesh, int face, std::span<const uint32_t> facets) {
   const auto point_of = [&](uint32_t v) {
@@ -201,7 +201,7 @@ void ExpectBoundary(const Mesh& mesh) {
   EXPECT_TRUE(mesh.simplex_regions.empty());
 }
 
-// What vertex_origins says, from input_vertex and the coordinates alone; repairs count as Steiner vertices.
+// Expects vertex_origins as input_vertex and the coordinates alone give them; repairs count as Steiner vertices.
 void ExpectOrigins(const Mesh& mesh) {
   const int d = mesh.dimension;
   ASSERT_EQ(mesh.vertex_origins.size(), mesh.vertex_count());
@@ -348,7 +348,7 @@ TEST(Boundary, StopsWhenItIsCancelled) {
       FindBoxBoundary({mesh.domain_low, mesh.domain_high, mesh.points, mesh.simplices}, 1, context).status()));
 }
 
-// What is planted, and what is said of it.
+// Planted faults, and the errors that name them.
 TEST(Boundary, PlantedFaultsAreFound) {
   for (const int dimension : {2, 3, 4}) {
     SCOPED_TRACE(dimension);

@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "core/geometry/point.h"
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "tests/core/domain_input.h"
 #include "tests/support/clouds.h"
 #include "tests/support/meshes.h"
@@ -108,7 +108,7 @@ std::vector<double> Gaps(const DelaunayMesh& mesh, const DualCells& cells) {
   return gaps;
 }
 
-// What holds for every mesh of a domain with this volume and surface.
+// Expects the laws that hold for every mesh of a domain with this volume and surface.
 void ExpectDual(const DelaunayMesh& mesh, const DualCells& cells, double volume, double surface) {
   EXPECT_NEAR(Sum(cells.volumes), volume, kRounding * volume);
   EXPECT_NEAR(Sum(cells.facet_areas), surface, kRounding * surface);
@@ -126,7 +126,7 @@ void ExpectDual(const DelaunayMesh& mesh, const DualCells& cells, double volume,
 
 class DualOfCloudTest : public testing::TestWithParam<std::string_view> {};
 
-// By what the Python package's Mesh.dual_cells() computes of these meshes, in another way.
+// By the results of the Python package's Mesh.dual_cells() for these meshes, in another way.
 TEST(DualCellsTest, TwoTrianglesAreAsInPython) {
   const std::vector<double> points = {0, 0, 3, 0, 2, 1.5, -0.5, 2};
   const std::vector<uint32_t> simplices = {0, 1, 2, 0, 2, 3};

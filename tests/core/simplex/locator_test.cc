@@ -1,3 +1,4 @@
+// The simplex of a point against the definition, and barycentric coordinates.
 #include "core/simplex/locator.h"
 
 #include <algorithm>
@@ -9,8 +10,8 @@
 #include <vector>
 
 #include "core/features/features.h"
-#include "core/mesh_locator.h"
-#include "core/mesher.h"
+#include "core/mesh/mesh_locator.h"
+#include "core/meshers/mesher.h"
 #include "gtest/gtest.h"
 #include "tests/support/clouds.h"
 

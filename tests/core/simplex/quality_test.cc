@@ -1,3 +1,4 @@
+// Ratios and angles of simplices against closed forms and eighty digits, in all dimensions.
 #include "core/simplex/quality.h"
 
 #include <gtest/gtest.h>

@@ -269,7 +269,8 @@ TEST_F(StarsOfRefinementTest, GiveTheSimplicesAfterVerticesWereMoved) {
   SliverStage<3> stage;
   const RepairCriteria criteria{{.rho = 2}, 15, kMinEdge, 1'000'000};
   std::vector<bool> moved;
-  const absl::Status repaired = stage.Repair(structure, refinement, is_fixed, criteria, moved, 1, context);
+  BoxCarrier carrier;
+  const absl::Status repaired = stage.Repair(structure, refinement, carrier, is_fixed, criteria, moved, 1, context);
   ASSERT_TRUE(repaired.ok()) << repaired;
   EXPECT_GT(stage.statistics().moves, 0u);
   EXPECT_FALSE(refinement.stars().IsComplete());

@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "core/validate/validate.h"
 #include "tests/support/clouds.h"
 

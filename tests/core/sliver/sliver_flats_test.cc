@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "core/geometry/point.h"
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "core/simplex/quality.h"
 #include "core/sliver/repair.h"
 #include "core/validate/validate.h"
@@ -171,7 +171,7 @@ TEST_P(SliverFlatsTest, DoNotDependOnThreads) {
   EXPECT_EQ(one.statistics.sliver_operations, three.statistics.sliver_operations);
 }
 
-// However large rho is, and with it stars: the repair ends, and says what it leaves.
+// However large rho is, and with it stars: the repair ends, and counts the slivers left.
 TEST(SliverWorkTest, IsBoundedWhateverRho) {
   const std::vector<double> torus = Placed(Torus(12, 24), 0, 1, {0, 0, 0});
   const std::vector<double> sphere = Placed(Sphere(15, 30), 0, 1, {0, 0, 0});
@@ -183,7 +183,7 @@ TEST(SliverWorkTest, IsBoundedWhateverRho) {
       parameters.rho = rho;
       const Mesh mesh = MeshOf(parameters, cloud);
       const MeshStatistics& statistics = mesh.statistics;
-      const uint64_t most = Repairer::kMostOperations * (statistics.slivers + Repairer::kFreeSlivers);
+      const uint64_t most = RepairReport::kMostOperations * (statistics.slivers + RepairReport::kFreeSlivers);
       EXPECT_LT(statistics.sliver_operations, most + most / 100);
       // Those of the default are far from the bound.
       EXPECT_LT(statistics.sliver_operations, rho == 2 ? 10'000 * statistics.slivers : most + most / 100);

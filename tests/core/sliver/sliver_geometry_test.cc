@@ -1,4 +1,4 @@
-// What repair and pumping decide in doubles, against the exact predicates, and with every vector unit.
+// Decisions of repair and pumping in doubles, against the exact predicates, and with every vector unit.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// No slivers: what repair and pumping promise of whole meshes.
+// No slivers: the guarantees of repair and pumping for whole meshes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "core/geometry/point.h"
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "core/validate/validate.h"
 #include "tests/support/canonical.h"
 #include "tests/support/clouds.h"
@@ -285,7 +285,7 @@ TEST_P(SliverTest, ARepairedMeshIsFoundAgainFromFacetToFacet) {
   const absl::StatusOr<Mesh> repaired = (*mesher)->Extract(1, context);
   ASSERT_TRUE(repaired.ok()) << repaired.status();
   EXPECT_TRUE(cloud_.size() < 600 || repaired->statistics.sliver_moves > 0);
-  // What repair kept goes, and the same demands ask for nothing.
+  // Data that repair kept are dropped, and the same demands ask for nothing.
   parameters.min_dihedral = 0;
   ASSERT_TRUE((*mesher)->Refine(parameters, context).ok());
   const absl::StatusOr<Mesh> again = (*mesher)->Extract(1, context);
@@ -327,7 +327,7 @@ class LenderWithATurn final : public MemoryLender {
   int asked_ = 0;
 };
 
-// Between any two passes repair can be stopped; what it has done is valid, and a later run goes on from there.
+// Between any two passes repair can be stopped; its work until then is valid, and a later run goes on from there.
 TEST(SliverSessionTest, StoppedAfterAnyPassItGoesOn) {
   const std::vector<double> cloud = test::MakeCloud("uniform", 3, 300);
   const MeshParameters parameters = InUnitBox(3, 18);

@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "core/validate/validate.h"
 #include "tests/support/clouds.h"
 #include "tests/support/dimensions.h"

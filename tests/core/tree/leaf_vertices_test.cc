@@ -1,4 +1,4 @@
-// The pool of the vertices of leaves, against vectors, and what it takes in memory.
+// The pool of the vertices of leaves, against vectors, and its memory.
 #include "core/tree/leaf_vertices.h"
 
 #include <gtest/gtest.h>
@@ -63,7 +63,7 @@ TEST_F(LeafVertexPoolTest, TakeWhatTheirVerticesNeed) {
   EXPECT_EQ(pool.MemoryBytes(), kCount * VertexPool::BytesFor(1));
   EXPECT_LE(VertexPool::BytesFor(1), sizeof(VertexPool::LeafVertices) + kMost / 8 * kPlace);
   EXPECT_EQ(VertexPool::BytesFor(kMost), sizeof(VertexPool::LeafVertices) + kMost * kPlace);
-  // What is given back serves again.
+  // Places that are given back serve again.
   const uint64_t bytes = pool.MemoryBytes();
   for (uint32_t i = 0; i < kCount; ++i) {
     pool.Dissolve(i, [](VertexId, const Point<3>&) {});

@@ -212,7 +212,7 @@ TEST_F(SurfaceIndexTest, NearestPointsAreThoseOfBruteForce) {
       const Point<3> p = SomePoint(*indexed);
       SurfacePoint expected{.distance_sq = std::numeric_limits<double>::infinity()};
       for (uint32_t t = 0; t < indexed->complex.triangles.size(); ++t) {
-        const Point<3> at = NearestPoint(indexed->index.TriangleAt(t), p);
+        const Point<3> at = NearestPoint(InOrder(indexed->index.TriangleAt(t)), p);
         if (DistanceSq<3>(at, p) < expected.distance_sq) {
           expected = {at, t, DistanceSq<3>(at, p)};
         }
@@ -223,6 +223,62 @@ TEST_F(SurfaceIndexTest, NearestPointsAreThoseOfBruteForce) {
       EXPECT_EQ(found->at, expected.at) << given.name;
       EXPECT_FALSE(indexed->index.Nearest(p, expected.distance_sq).has_value() && expected.distance_sq > 0);
       EXPECT_TRUE(indexed->index.Nearest(p, 1.001 * expected.distance_sq + 1e-30).has_value());
+    }
+  }
+}
+
+TEST_F(SurfaceIndexTest, NearestOfSomeTrianglesIsThatOfBruteForce) {
+  for (const test::NamedComplex& given : Surfaces()) {
+    const std::unique_ptr<Indexed> indexed = IndexOf(given.surface);
+    const auto triangles = static_cast<uint32_t>(indexed->complex.triangles.size());
+    for (int i = 0; i < 200; ++i) {
+      const Point<3> p = SomePoint(*indexed);
+      const auto step = static_cast<uint32_t>(2 + i % 5);
+      const auto counts = [&](uint32_t t) { return t % step == 1; };
+      SurfacePoint expected{.distance_sq = std::numeric_limits<double>::infinity()};
+      for (uint32_t t = 1; t < triangles; t += step) {
+        const Point<3> at = NearestPoint(indexed->index.InOrderAt(t), p);
+        if (const double distance_sq = DistanceSq<3>(at, p); distance_sq < expected.distance_sq) {
+          expected = {at, t, distance_sq};
+        }
+      }
+      const std::optional<SurfacePoint> found = indexed->index.NearestOf(counts, p);
+      ASSERT_TRUE(found.has_value()) << given.name;
+      EXPECT_EQ(found->at, expected.at) << given.name;
+      EXPECT_EQ(found->triangle, expected.triangle) << given.name;
+      EXPECT_FALSE(indexed->index.NearestOf([](uint32_t) { return false; }, p).has_value());
+    }
+  }
+}
+
+TEST_F(SurfaceIndexTest, WhatIsWithinIsThatOfBruteForceWhereverOneBegins) {
+  for (const test::NamedComplex& given : Surfaces()) {
+    const std::unique_ptr<Indexed> indexed = IndexOf(given.surface);
+    SurfaceIndex for_distances;
+    ASSERT_TRUE(for_distances.BuildForDistances(indexed->complex, MortonGrid<3>(indexed->box), RunContext()).ok());
+    const auto triangles = static_cast<uint32_t>(indexed->complex.triangles.size());
+    for (int i = 0; i < 300; ++i) {
+      const Point<3> p = SomePoint(*indexed);
+      const auto distance_sq_of = [&](uint32_t t) {
+        EXPECT_EQ(indexed->index.InOrderAt(t), InOrder(indexed->index.TriangleAt(t)));
+        return DistanceSq<3>(NearestPoint(indexed->index.InOrderAt(t), p), p);
+      };
+      double least_sq = std::numeric_limits<double>::infinity();
+      for (uint32_t t = 0; t < triangles; ++t) {
+        least_sq = std::min(least_sq, distance_sq_of(t));
+      }
+      const SurfacePoint nearest = *indexed->index.Nearest(p);
+      const SurfacePoint other = *for_distances.Nearest(p);
+      EXPECT_EQ(other.at, nearest.at);
+      EXPECT_EQ(other.triangle, nearest.triangle);
+      for (const double share : {0.5, 0.999, 1.0, 1.001, 4.0}) {
+        const auto first = std::min(static_cast<uint32_t>(random_.Unit() * triangles), triangles - 1);
+        uint32_t near = first;
+        ASSERT_EQ(indexed->index.IsWithin(p, share * least_sq, near), least_sq <= share * least_sq) << given.name;
+        EXPECT_TRUE(near == first || distance_sq_of(near) <= share * least_sq);
+        near = first;
+        EXPECT_EQ(for_distances.IsWithin(p, share * least_sq, near), least_sq <= share * least_sq);
+      }
     }
   }
 }
@@ -256,7 +312,7 @@ TEST_F(SurfaceIndexTest, NoTriangleNearABoxIsMissing) {
       }
     }
     for (const uint32_t t : near) {
-      const Point<3> at = NearestPoint(indexed->index.TriangleAt(t), p);
+      const Point<3> at = NearestPoint(InOrder(indexed->index.TriangleAt(t)), p);
       EXPECT_LE(DistanceSq<3>(at, p), 3.001 * 0.25 * std::pow(box.LongestSide(), 2));
     }
   }

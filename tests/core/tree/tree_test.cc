@@ -266,7 +266,7 @@ void ExpectLeavesNoCoarserThanFeatures(const LeafTree<D>& tree, const MortonGrid
   }
 }
 
-// What the tree says of the points' separation is true, and says something unless a leaf is as small as the grid's
+// The tree's bound on the points' separation is true, and is above 0 unless a leaf is as small as the grid's
 // cubes.
 template <int D>
 void ExpectSeparated(const LeafTree<D>& tree, const MortonGrid<D>& grid, const std::vector<Point<D>>& points) {
@@ -339,7 +339,7 @@ void ExpectBuildInvariants(const MortonGrid<D>& grid, const std::vector<Point<D>
   ExpectEverySplitHasAReason<D>(tree, grid.box(), points);
 }
 
-// How points of the unit box are brought to `box`: the faces on the faces exactly.
+// The points of the unit box, brought to `box`: those on faces lie on its faces exactly.
 template <int D>
 std::vector<Point<D>> Stretched(std::vector<Point<D>> points, const Box<D>& box) {
   for (Point<D>& p : points) {

@@ -1,4 +1,4 @@
-// Faults planted in a mesh that is right, in every dimension: each check has to find what is its own to find.
+// Faults planted in a mesh that is right, in every dimension: each check has to find its own faults.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -230,7 +230,7 @@ TEST_P(PlantedFaultsTest, AreFoundByTheChecksWhoseTheyAre) {
       EXPECT_EQ(check->run(sound, mesh.View()).code(), absl::StatusCode::kFailedPrecondition)
           << fault.name << ": " << name << " does not find it";
     }
-    // The whole finds what a part finds.
+    // The whole check finds the faults that a part finds.
     const absl::Status whole = ValidateMesh(mesh.View(), {.rho = sound.rho,
                                                           .criterion = Criterion::kRadiusEdge,
                                                           .max_circumradius = sound.largest,

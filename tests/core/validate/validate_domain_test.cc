@@ -207,7 +207,7 @@ TEST(ValidateDomainTest, ACancelledRunEnds) {
   EXPECT_TRUE(absl::IsCancelled(ValidateConformity(mesh.View(), mesh.Parts(), domain, 1e-12, context)));
 }
 
-// What is quadratic in pairs: segments that lie on each other, in a fan, and rings in each other; half of it is not
+// Inputs that are quadratic in pairs: segments on each other, in a fan, and rings in each other; half of it is not
 // meshed, so that the check finds the faces there.
 TEST(ValidateDomainTest, ManyThatLieOnEachOtherOrHaveACommonEndAreFollowedInTime) {
   constexpr int kCount = 3000;

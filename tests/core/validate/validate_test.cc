@@ -1,3 +1,4 @@
+// The validators accept good meshes and find each fault that is planted in one.
 #include "core/validate/validate.h"
 
 #include <gmock/gmock.h>

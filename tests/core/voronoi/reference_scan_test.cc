@@ -321,7 +321,7 @@ bool Touches(const QueryStructure<D>& structure, const Polytope<D>& cell, Vertex
 }
 
 // The leaves that a ball about a point of `cell` reaches, by a look at all; a ball counts `margin` of its radius
-// larger, and what rounding leaves open about its node is added (for a positive margin) or subtracted.
+// larger, and the uncertainty of its node by rounding is added (for a positive margin) or subtracted.
 template <int D>
 std::set<NodeId> LeavesOfCertificateRegion(const QueryStructure<D>& structure, const Polytope<D>& cell, double margin) {
   std::set<NodeId> leaves;
@@ -352,7 +352,7 @@ struct Totals {
 template <int D>
 class ScanComparer {
  public:
-  // The fast scan and the reference give one cell; what they open is as claimed.
+  // The fast scan and the reference give one cell; the leaves that they open are as claimed.
   void Compare(const QueryStructure<D>& structure, VertexId v, double radius) {
     SCOPED_TRACE("vertex " + std::to_string(Index(v)) + " of " + std::to_string(structure.vertex_count()) +
                  ", clipped at " + std::to_string(radius));
@@ -478,7 +478,7 @@ TYPED_TEST(ReferenceScanTest, AgreesWithTheFastScanAtEveryStageOfRefinement) {
   }
 }
 
-// What is opened up to a clipping distance t by the paper's ball is a beginning of the scan in any larger cube.
+// The leaves opened up to a clipping distance t by the paper's ball are a beginning of the scan in any larger cube.
 TYPED_TEST(ReferenceScanTest, VisitsOfSmallerBallsComeFirstAndAreTheSame) {
   constexpr int D = TypeParam::kValue;
   const QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("uniform", 60));

@@ -181,7 +181,7 @@ TEST(LateNeighboursTest, AreCancelled) {
   }
 }
 
-// What a vertex lists, and when that was; when a vertex was added.
+// The list of a vertex, and the time of the look that made it; the time when the vertex was added.
 struct ModelEntry {
   std::vector<std::array<VertexId, 3>> listed;
   int look = -1;

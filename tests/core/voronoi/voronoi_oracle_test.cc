@@ -97,8 +97,8 @@ class QueryChecker {
     CheckRatios(structure, v, radius);
   }
 
-  // What is sure before the nodes are placed holds once they are, and is told of all that keep the ratio with some
-  // room.
+  // A ratio that is sure before the nodes are placed holds once they are. All cells that keep it with some room are
+  // known to keep it.
   void CheckRatios(const QueryStructure<D>& structure, VertexId v, double radius) {
     Polytope<D>& cell = fast_.cell;
     structure.UnplacedClippedVoronoi(v, CubeAround<D>(structure.point(v), radius), fast_);

@@ -1,5 +1,5 @@
 // Meshes three points in a box by the installed core, adds a fourth, and checks the mesh.
-#include <wellspace/core/mesher.h>
+#include <wellspace/core/meshers/mesher.h>
 #include <wellspace/core/validate/validate.h>
 
 #include <iostream>

@@ -1,3 +1,4 @@
+// Calls are admitted until the registry closes, and it waits for the last one.
 #include "server/calls/call_registry.h"
 
 #include <cstdint>

@@ -1,3 +1,4 @@
+// A repeated request gets the first answer; which are remembered, for how long and in how much memory.
 #include "server/calls/request_ids.h"
 
 #include <string>
@@ -5,7 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "gtest/gtest.h"
-#include "server/store/ephemeral_log.h"
+#include "server/store/memory_records.h"
 #include "tests/server/service_harness.h"
 #include "wellspace/v1/sessions.pb.h"
 
@@ -32,8 +33,8 @@ class RequestIdsTest : public ::testing::Test {
   }
 
   absl::Duration now_ = absl::Hours(1);
-  EphemeralLog log_;
-  RequestIds ids_{[this] { return now_; }, log_};
+  MemoryRecords records_;
+  RequestIds ids_{[this] { return now_; }, records_};
   int done_ = 0;
 };
 
@@ -122,7 +123,7 @@ TEST_F(RequestIdsTest, AnswersOfAnEarlierProcessAreGivenAgain) {
         done(Ok(response.SerializeAsString()));
       },
       [](const RequestIds::Answer&) {});
-  RequestIds next([this] { return now_; }, log_);
+  RequestIds next([this] { return now_; }, records_);
   next.Restore(written);
   const auto ask = [&](const std::string& name) {
     request.set_name(name);
@@ -134,6 +135,42 @@ TEST_F(RequestIdsTest, AnswersOfAnEarlierProcessAreGivenAgain) {
   };
   EXPECT_EQ(ask("x").response, response.SerializeAsString());
   EXPECT_EQ(DetailsOf(ask("y").status).reason, "REQUEST_ID_REUSED");
+}
+
+// Two processes are asked: the second does not repeat a change that the first has committed, however its work ends.
+TEST_F(RequestIdsTest, WhatAnotherProcessHasAnsweredIsGivenAgain) {
+  RequestIds other([this] { return now_; }, records_);
+  v1::CreateSessionResponse response;
+  const auto commit = [&](const IdentifiedRequest& identified, const std::string& session) {
+    response.mutable_session()->set_name(session);
+    return records_.Apply(
+        {.session = session, .epoch = records_.epoch(), .is_creation = true, .answer = identified.Answer(response)},
+        Survives::kPowerLoss);
+  };
+  int created = 0;
+  const auto ask = [&](RequestIds& ids, const std::string& label, const absl::Status& failure = absl::OkStatus()) {
+    v1::CreateSessionRequest request;
+    (*request.mutable_labels())["label"] = label;
+    RequestIds::Answer got;
+    ids.Once(
+        "a", "1", request,
+        [&](const IdentifiedRequest& identified, const RequestIds::Done& done) {
+          const absl::Status status =
+              failure.ok() ? commit(identified, absl::StrCat("sessions/", created + 1)) : failure;
+          created += status.ok() ? 1 : 0;
+          done({status, response.SerializeAsString()});
+        },
+        [&](const RequestIds::Answer& answer) { got = answer; });
+    v1::CreateSessionResponse parsed;
+    parsed.ParseFromString(got.response);
+    return got.status.ok() ? parsed.session().name() : DetailsOf(got.status).reason;
+  };
+  EXPECT_EQ(ask(ids_, "x"), "sessions/1");
+  EXPECT_EQ(ask(other, "y"), "REQUEST_ID_REUSED");
+  EXPECT_EQ(ask(other, "x", absl::NotFoundError("deleted meanwhile")), "sessions/1");
+  EXPECT_EQ(ask(other, "x"), "sessions/1");
+  EXPECT_EQ(ask(ids_, "x"), "sessions/1");
+  EXPECT_EQ(created, 1);
 }
 
 TEST_F(RequestIdsTest, ARequestWithoutAnIdHasNoAnswerToBeWritten) {

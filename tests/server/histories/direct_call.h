@@ -14,7 +14,7 @@
 
 namespace wellspace::server {
 
-// What a client sees of a call, and the transport between the two.
+// A call as its client sees it, and the transport between the two.
 //
 // Thread safety: none.
 // Invariants: the reactor is told of nothing while it calls: all is delivered by Deliver.
@@ -36,11 +36,11 @@ class DirectCall {
 
   // The handler is done with the call.
   bool has_ended() const { return has_ended_; }
-  // How it has ended, for its client; nothing: it has not, or its server had died before.
+  // Its end, as its client sees it; nothing: it has not, or its server had died before.
   const std::optional<grpc::Status>& status() const { return status_; }
 
  protected:
-  // `is_alive`: whether what the server says goes out.
+  // `is_alive`: whether the server's answers go out.
   explicit DirectCall(std::function<bool()> is_alive) : is_alive_(std::move(is_alive)) {}
 
   void Take(grpc::Status status) {

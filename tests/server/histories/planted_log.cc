@@ -37,15 +37,18 @@ class PlantedPoints final : public PointStore {
 
 }  // namespace
 
-absl::StatusOr<StoredSessions> PlantedLog::Load() {
-  WELLSPACE_ASSIGN_OR_RETURN(StoredSessions stored, PassingLog::Load());
+absl::StatusOr<StoredSessions> PlantedRecords::Load() {
+  WELLSPACE_ASSIGN_OR_RETURN(StoredSessions stored, PassingRecords::Load());
   for (const StoredSession& session : stored.sessions) {
     states_[session.state.name()] = session.state;
+  }
+  if (plant_.hides_answers) {
+    stored.answers.clear();
   }
   return stored;
 }
 
-absl::Status PlantedLog::Commit(const SessionChange& change, Survives survives) {
+absl::Status PlantedRecords::Apply(const SessionChange& change, Survives survives) {
   const bool is_planted = step_() == plant_.during;
   if (is_planted && plant_.removes_files_first) {
     RemoveFilesOf(change);
@@ -59,16 +62,16 @@ absl::Status PlantedLog::Commit(const SessionChange& change, Survives survives) 
     late_.emplace_back(change, survives);
     return absl::OkStatus();
   }
-  return PassingLog::Commit(change, survives);
+  return PassingRecords::Apply(change, survives);
 }
 
-void PlantedLog::EndStep() {
+void PlantedRecords::EndStep() {
   for (const auto& [change, survives] : std::exchange(late_, {})) {
-    PassingLog::Commit(change, survives).IgnoreError();
+    PassingRecords::Apply(change, survives).IgnoreError();
   }
 }
 
-void PlantedLog::RemoveFilesOf(const SessionChange& change) {
+void PlantedRecords::RemoveFilesOf(const SessionChange& change) {
   const auto known = states_.find(change.session);
   if (known == states_.end() || !(change.is_deletion || change.state.has_value())) {
     return;
@@ -84,11 +87,10 @@ void PlantedLog::RemoveFilesOf(const SessionChange& change) {
   }
 }
 
-std::unique_ptr<PointStore> PlantedLog::OpenPoints(const std::string& session, int dimension, uint64_t number,
-                                                   std::vector<store::v1::StepRecord::Points> committed) {
-  return std::make_unique<PlantedPoints>(
-      PassingLog::OpenPoints(session, dimension, number, std::move(committed)),
-      [this] { return plant_.omits_points_synchronize && step_() == plant_.during; });
+std::unique_ptr<PointStore> PlantedFiles::OpenPoints(SessionPoints points) {
+  return std::make_unique<PlantedPoints>(PassingFiles::OpenPoints(std::move(points)), [this] {
+    return plant_.omits_points_synchronize && step_() == plant_.during;
+  });
 }
 
 }  // namespace wellspace::server

@@ -1,4 +1,4 @@
-// What clients do with a server, what they were answered, and what they have to find after each crash.
+// Clients of a server: the calls that they make, the answers, and the state that they have to find after each crash.
 #ifndef WELLSPACE_TESTS_SERVER_HISTORIES_SESSION_LIFE_H_
 #define WELLSPACE_TESTS_SERVER_HISTORIES_SESSION_LIFE_H_
 
@@ -15,7 +15,7 @@
 
 namespace wellspace::server {
 
-// What a client knows of an operation.
+// A client's knowledge of an operation.
 struct KnownOperation {
   enum class State { kUnderWay, kSucceeded, kFailed, kCancelled };
 
@@ -26,16 +26,17 @@ struct KnownOperation {
   int deaths = 0;  // of processes, in its work
 };
 
-// What a client knows of a session.
+// A client's knowledge of a session: a box or a domain in the plane, or the inside of a block in space.
 struct KnownSession {
   std::string name;
   std::string label;
+  size_t dimension = 2;
   int64_t ttl_seconds = 3600;
   uint64_t revision = 1;
   bool is_ready = false;
   std::vector<double> points;
-  uint64_t points_file = 0;
   std::vector<uint32_t> segment_ends;
+  size_t triangles = 0;  // of the block
   std::vector<double> sizes;
   uint64_t mesh_revision = 0;  // 0: none
   std::string mesh;            // its download; empty: not seen yet
@@ -43,12 +44,14 @@ struct KnownSession {
   std::vector<KnownOperation> operations;
 
   bool IsBusy() const;
+  size_t point_count() const { return points.size() / dimension; }
+  size_t size_count() const { return sizes.size() / (dimension + 1); }
 };
 
 // By a number of the clients'.
 using World = std::map<int, KnownSession>;
 
-// What GetSession and ListOperations say of it.
+// The figures of it that GetSession and ListOperations show, as text.
 std::string TextOf(const World& world);
 
 // Clients of one server, each with one call after the other. A client whose call is not answered, since the server has
@@ -58,19 +61,20 @@ std::string TextOf(const World& world);
 class SessionLife {
  public:
   static constexpr int kSessions = 3;
+  static constexpr int kBlock = kSessions - 1;  // the number of the one in space
 
   // REQUIRES:   `disk` is new, and outlives this.
   SessionLife(SimulatedDisk& disk, const Plant& plant)
       : disk_(disk), server_(disk, plant), is_planted_(plant.during != Step::kLook) {}
 
-  // Starts the server. What is wrong; nothing: all is as it should be, or the disk has died.
+  // Starts the server. Returns the fault; empty: all is as it should be, or the disk has died.
   std::string Start();
-  // Does one thing to the session of this number, if that can be done to it now. What is wrong, or nothing.
+  // Does one thing to the session of this number, if that can be done to it now. Returns the fault, or "".
   std::string Do(Step step, int number, test::SplitMix64& random);
   // One of them, drawn.
   std::string DoAnything(test::SplitMix64& random);
   // Ends the process as a crash does, starts the machine and the server again, with crashes meanwhile, and looks at all
-  // that clients were answered. What is wrong, or nothing.
+  // that clients were answered. Returns the fault, or "".
   std::string Restart(SimulatedDisk::Loss loss, test::SplitMix64& random);
   // Lets all operations come to their end, and looks at all; then at the folder, as check-data does.
   std::string CheckWhole();
@@ -82,7 +86,7 @@ class SessionLife {
   // A change: its call, which may be made again, and the world when it was made.
   struct Change {
     Step step = Step::kLook;
-    // What is wrong with the answer, if there is any. What the client learns by it goes into `*after`.
+    // Returns the fault of the answer, if there is any. The client's new knowledge goes into `*after`.
     std::function<std::string(World* after, bool* is_answered)> call;
     World after;
   };
@@ -92,7 +96,9 @@ class SessionLife {
   Change UpdateOf(int number, int64_t ttl_seconds);
   Change UploadOf(int number, bool breaks_off, test::SplitMix64& random);
   Change RemovePointsOf(int number, test::SplitMix64& random);
-  Change AddSegmentsOf(int number);
+  // Segments of one in the plane, triangles of the block.
+  Change AddFeaturesOf(int number);
+  Change AddTrianglesOf(int number);
   Change SetSizesOf(int number, test::SplitMix64& random);
   // Of `known`, which is the world, or that after points have come.
   Change RefineOf(World known, int number, bool restart);
@@ -105,6 +111,8 @@ class SessionLife {
   std::optional<Change> ChangeOf(Step step, int number, test::SplitMix64& random);
 
   std::string Expire(int number);
+  // Makes the last call with a request_id once more, which was answered.
+  std::string Repeat();
   // The job whose turn it is.
   std::string Work();
   std::string EndWork(int number, const v1::Operation& ended);
@@ -117,7 +125,7 @@ class SessionLife {
   std::string Find();
   // Takes the names that the server has given, and has the operations watched that are under way.
   std::string TakeNames();
-  // Whether all that was sent is there: points, segments, sizes, meshes; and no file besides.
+  // Whether all that was sent is there: points, segments, triangles, sizes, meshes; and no file besides.
   std::string CheckContents();
   std::string CheckMesh(KnownSession& session);
   std::string CheckInputs(const KnownSession& session);
@@ -125,10 +133,11 @@ class SessionLife {
 
   SimulatedDisk& disk_;
   SimulatedServer server_;
-  const bool is_planted_;             // then clients have to find what is wrong
+  const bool is_planted_;             // then clients have to find the fault
   World world_;                       // after the last change that was answered
   std::vector<World> candidates_;     // besides, those that may be there after a crash
   std::optional<Change> unanswered_;  // that is made again after a crash
+  std::optional<Change> repeated_;    // the last one with a request_id that was answered
   std::map<int, std::string> names_;  // of the sessions, as the server has last shown them
   uint64_t salt_ = 0;                 // makes each change another
 };

@@ -16,16 +16,20 @@ constexpr uint64_t kChunkBytes = 400;  // so that small meshes have several
 
 }  // namespace
 
-SimulatedServer::Process::Process(SimulatedServer& machine, std::unique_ptr<PlantedLog> planted)
+SimulatedServer::Process::Process(SimulatedServer& machine, std::shared_ptr<SessionLog> durable)
     : log(std::make_shared<spdlog::logger>("simulated")),
       connections({}, log),
       observability({v1::SessionService::service_full_name(), v1::OperationService::service_full_name(),
                      v1::QueryService::service_full_name()},
                     log, connections, [](const grpc::ServerContextBase&) { return std::string(); }),
-      session_log(planted.get()),
+      records(
+          new PlantedRecords(durable, machine.disk_, kFolder, machine.plant_, [&machine] { return machine.step_; })),
       backend(
-          {.workers = machine.workers_}, authenticator, observability, log, std::move(planted), core::MeshPoints,
-          core::EstimateMesh, machine.create_mesher_,
+          {.workers = machine.workers_}, authenticator, observability, log,
+          std::make_unique<SessionLog>(
+              std::unique_ptr<Records>(records),
+              std::make_unique<PlantedFiles>(durable, machine.plant_, [&machine] { return machine.step_; })),
+          core::MeshPoints, core::EstimateMesh, machine.create_mesher_,
           {.clock = {
                .wall =
                    [&machine] { return absl::FromUnixSeconds(1'800'000'000) + absl::Milliseconds(++machine.ticks_); },
@@ -36,13 +40,12 @@ SimulatedServer::Process::Process(SimulatedServer& machine, std::unique_ptr<Plan
 absl::Status SimulatedServer::Start() {
   Begin(Step::kStart);
   WELLSPACE_ASSIGN_OR_RETURN(
-      std::unique_ptr<DurableLog> log,
-      DurableLog::Open({.folder = kFolder,
-                        .files = &disk_.files(),
-                        .tables = {.vfs = disk_.vfs(), .is_exclusive = true, .checkpoint_pages = 15},
-                        .max_mesh_chunk_bytes = kChunkBytes}));
-  process_ = std::make_unique<Process>(
-      *this, std::make_unique<PlantedLog>(std::move(log), disk_, kFolder, plant_, [this] { return step_; }));
+      std::unique_ptr<SessionLog> log,
+      OpenDurableLog({.folder = kFolder,
+                      .files = &disk_.files(),
+                      .tables = {.vfs = disk_.vfs(), .is_exclusive = true, .checkpoint_pages = 15},
+                      .max_mesh_chunk_bytes = kChunkBytes}));
+  process_ = std::make_unique<Process>(*this, std::move(log));
   backend_ = &process_->backend;
   WELLSPACE_RETURN_IF_ERROR(backend_->Restore());
   EndStep();
@@ -65,7 +68,7 @@ void SimulatedServer::Kill() {
 void SimulatedServer::EndStep() {
   while (DoNext()) {
   }
-  process_->session_log->EndStep();
+  process_->records->EndStep();
   while (DoNext()) {
   }
   Begin(Step::kLook);
@@ -166,6 +169,10 @@ Answered<v1::AddSegmentsResponse> SimulatedServer::AddSegments(const v1::AddSegm
   return Stream<v1::AddSegmentsResponse>(&SessionService::AddSegments, std::vector{request});
 }
 
+Answered<v1::AddTrianglesResponse> SimulatedServer::AddTriangles(const v1::AddTrianglesRequest& request) {
+  return Stream<v1::AddTrianglesResponse>(&SessionService::AddTriangles, std::vector{request});
+}
+
 Answered<v1::SetSizesResponse> SimulatedServer::SetSizes(const v1::SetSizesRequest& request) {
   return Stream<v1::SetSizesResponse>(&SessionService::SetSizes, std::vector{request});
 }
@@ -243,7 +250,7 @@ void SimulatedServer::Pass(absl::Duration time) {
 }
 
 std::string SimulatedServer::CheckStates() {
-  const absl::StatusOr<StoredSessions> stored = process_->session_log->Load();
+  const absl::StatusOr<StoredSessions> stored = process_->records->Load();
   if (!stored.ok()) {
     return stored.status().ToString();
   }

@@ -25,7 +25,7 @@
 
 namespace wellspace::server {
 
-// How a call has ended for its client. Neither: its server died before.
+// The end of a call, as its client sees it. Neither: its server died before.
 template <typename Response>
 struct Answered {
   bool is_ok = false;
@@ -34,8 +34,8 @@ struct Answered {
 };
 
 // One machine: its disk, its clock, and one process of the server at a time. All of a process runs in the calls of
-// this: what is posted to its threads, and what its clients send. When the disk is dead the process is, too: whatever
-// else it does goes nowhere.
+// this: tasks that are posted to its threads, and requests of its clients. When the disk is dead the process is, too:
+// whatever else it does goes nowhere.
 //
 // Thread safety: none.
 class SimulatedServer {
@@ -57,9 +57,9 @@ class SimulatedServer {
   // Ends the process as a crash does. REQUIRES: the disk is dead, or there is no process.
   void Kill();
 
-  // What the process is at from now on.
+  // The step that the process is at from now on.
   void Begin(Step step) { step_ = step; }
-  // Ends that: calls of EndStep that are left out look like a process that is still at it.
+  // Ends the step: calls of EndStep that are left out look like a process that is still at it.
   void EndStep();
 
   // Calls, each to its end.
@@ -74,6 +74,7 @@ class SimulatedServer {
                                                   const std::function<void()>& beside);
   Answered<v1::RemovePointsResponse> RemovePoints(const v1::RemovePointsRequest& request);
   Answered<v1::AddSegmentsResponse> AddSegments(const v1::AddSegmentsRequest& request);
+  Answered<v1::AddTrianglesResponse> AddTriangles(const v1::AddTrianglesRequest& request);
   Answered<v1::SetSizesResponse> SetSizes(const v1::SetSizesRequest& request);
   Answered<v1::AddVerticesResponse> AddVertices(const v1::AddVerticesRequest& request);
   Answered<v1::StartRefinementResponse> Refine(const v1::StartRefinementRequest& request);
@@ -96,7 +97,7 @@ class SimulatedServer {
     std::unique_ptr<DirectDownload<v1::WatchOperationRequest, v1::WatchOperationResponse>> call_;
   };
   void Watch(const std::string& operation);
-  // What the client that watches it was told of its end.
+  // The operation at its end, as the client that watches it was told.
   std::optional<v1::Operation> EndOf(const std::string& operation) const;
 
   // Runs the job whose turn it is. False: there is none.
@@ -108,7 +109,10 @@ class SimulatedServer {
   // The hourly removal of files that are garbage.
   void Sweep();
 
-  // What is wrong with the states that sessions show: each is to be what a restart would make of the log.
+  // The records of all sessions, and the epoch of the server.
+  absl::StatusOr<Census> ReadCensus() { return process_->records->ReadCensus(); }
+
+  // Compares the states that sessions show with those that a restart would make of the log. Returns the difference.
   std::string CheckStates();
 
  private:
@@ -117,7 +121,7 @@ class SimulatedServer {
   }
   // Has all done that is to be done, until `call` has ended.
   void Finish(DirectCall& call);
-  // Does the next thing of what is to be done, but for jobs. False: there is none.
+  // Does the next task, but for jobs. False: there is none.
   bool DoNext();
   template <typename Request, typename Response, typename Service>
   Answered<Response> Unary(Service& service,
@@ -132,13 +136,13 @@ class SimulatedServer {
 
   // A process.
   struct Process {
-    explicit Process(SimulatedServer& machine, std::unique_ptr<PlantedLog> log);
+    Process(SimulatedServer& machine, std::shared_ptr<SessionLog> durable);
 
     std::shared_ptr<spdlog::logger> log;
     Connections connections;
     Observability observability;
     Authenticator authenticator;
-    PlantedLog* session_log;
+    PlantedRecords* records;  // of the backend
     Backend backend;
     SessionService sessions{backend.environment()};
     OperationService operations{backend.environment()};

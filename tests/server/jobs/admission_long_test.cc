@@ -50,7 +50,7 @@ uint64_t EstimateOf(v1::MeshingService::Stub& stub, const std::vector<double>& p
   return response.memory_bytes();
 }
 
-// What became of a client's wish for a mesh.
+// The outcome of a client's request for a mesh.
 struct Outcome {
   int refusals = 0;  // that said that it may be asked again
   bool is_meshed = false;
@@ -79,7 +79,7 @@ Outcome AskUntilMeshed(const std::string& address, const std::vector<double>& po
       return outcome;
     }
     ++outcome.refusals;
-    absl::SleepFor(absl::Seconds(1));  // what RetryInfo asks for
+    absl::SleepFor(absl::Seconds(1));  // the delay of RetryInfo
   }
 }
 
@@ -108,7 +108,7 @@ TEST(Admission, TwoHundredClientsWithTenTimesWhatFitsStayUnderTheLimitAndAllGetT
   const uint64_t peak = daemon.process().PeakMemory();
   std::cout << "peak " << (peak >> 20) << " MB of " << (kMaxMemoryBytes >> 20) << ", " << refusals << " refusals, "
             << (wanted >> 20) << " MB wanted\n";
-  EXPECT_GT(peak, kMaxMemoryBytes / 2);  // it has used what it may
+  EXPECT_GT(peak, kMaxMemoryBytes / 2);  // it has used its memory
   EXPECT_LT(peak, kMaxMemoryBytes);
   daemon.Stop();
 }

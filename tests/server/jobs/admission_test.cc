@@ -1,4 +1,4 @@
-// What a server with a limit of memory takes, refuses and lets wait; "refinement that eats the memory, and takes every
+// Admission under a limit of memory: jobs are taken, refused or wait; "refinement that eats the memory, and takes every
 // other user's work with it" cannot happen.
 #include <atomic>
 #include <memory>
@@ -62,7 +62,7 @@ v1::GetServerInfoResponse InfoWithToken(ServiceHarness& harness, const std::stri
   return response;
 }
 
-// What a call ends with that is made again while it is told to: a job's memory is free shortly after its call has
+// The status of a call that is made again while it is told to: a job's memory is free shortly after its call has
 // ended.
 grpc::Status SendUntilThereIsRoom(ServiceHarness& harness) {
   grpc::Status status;
@@ -151,7 +151,7 @@ TEST(Admission, AJobThatOutgrowsItsReservationEndsAndOthersGoOn) {
         EXPECT_TRUE(context.ReserveMemory(kMegabyte).ok());
         for (uint64_t bytes = kMegabyte; outgrows; bytes += kMegabyte) {
           if (absl::Status status = context.AllowMemory(bytes); !status.ok()) {
-            EXPECT_GT(bytes, 32 * kMegabyte);  // it had what there was
+            EXPECT_GT(bytes, 32 * kMegabyte);  // it had all that there was
             return status;
           }
         }

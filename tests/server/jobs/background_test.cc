@@ -1,3 +1,4 @@
+// Tasks run when they are due, in order; one that waits holds up no other.
 #include "server/jobs/background.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Turns of tenants and of their jobs, on queues drawn at random against a bound on the wait.
 #include "server/jobs/fair_queue.h"
 
 #include <map>

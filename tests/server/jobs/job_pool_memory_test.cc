@@ -260,7 +260,7 @@ TEST(JobPool, ManyTenantsWithTenTimesTheMemoryFinish) {
     std::this_thread::yield();
   }
   EXPECT_LE(most, pool.memory.limit());
-  // What the first trees of all will want is not known yet. When four begin at once, they may get into a deadlock: 1 in
+  // The demand of the first trees of all is not known yet. When four begin at once, they may get into a deadlock: 1 in
   // 3000 tests.
   EXPECT_GE(finished, kTenants * kJobs * 98 / 100);
   while (pool.GetLoad().running > 0) {

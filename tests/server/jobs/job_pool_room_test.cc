@@ -15,7 +15,7 @@
 namespace wellspace::server {
 namespace {
 
-// What sessions have reserved until it is wanted; all idle from the start, or once they are told.
+// Memory that sessions have reserved until it is wanted; all are idle from the start, or once they are told.
 class Sessions {
  public:
   explicit Sessions(MemoryBudget& memory) : memory_(memory) {

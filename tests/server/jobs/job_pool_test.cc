@@ -1,3 +1,4 @@
+// Order, limits, cancel and end of jobs on the threads of a pool.
 #include "server/jobs/job_pool.h"
 
 #include <atomic>

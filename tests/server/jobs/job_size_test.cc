@@ -1,4 +1,4 @@
-// Which jobs are small.
+// The sizes of jobs: small or not.
 #include "server/jobs/job_size.h"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// A job's memory and its cancel.
 #include "server/jobs/job.h"
 
 #include <memory>
@@ -53,7 +54,7 @@ TEST(Job, WhatTheWorkHoldsIsReleasedWithIt) {
   EXPECT_EQ(pool.memory.reserved(), 0u);
 }
 
-// What a job runs apart is cancelled with it.
+// Work that a job runs apart is cancelled with it.
 TEST(Job, CancelReachesWhatRunsApart) {
   Pool pool(1, 10);
   Event runs;

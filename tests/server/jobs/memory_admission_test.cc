@@ -1,3 +1,4 @@
+// Which jobs may have memory, on random states against the definition of a safe one.
 #include "server/jobs/memory_admission.h"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Jobs that do what a test wants.
+// Jobs that work as a test wants.
 #ifndef WELLSPACE_TESTS_SERVER_JOBS_TEST_JOBS_H_
 #define WELLSPACE_TESTS_SERVER_JOBS_TEST_JOBS_H_
 

@@ -137,7 +137,7 @@ class FullPipe {
 
   int descriptor() const { return ends_[1]; }
 
-  // What comes behind what has filled it, as long as it has fewer than `lines` lines.
+  // The text behind the bytes that have filled the pipe, as long as it has fewer than `lines` lines.
   std::string Read(size_t lines) {
     std::string text;
     while (std::count(text.begin(), text.end(), '\n') < static_cast<std::ptrdiff_t>(lines)) {

@@ -1,4 +1,4 @@
-// What the real program writes to standard error, and that it ends when nothing reads it.
+// The standard error of the real program: its lines, and that the program ends when nothing reads them.
 #include <fcntl.h>
 #include <signal.h>
 #include <sys/stat.h>

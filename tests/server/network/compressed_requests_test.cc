@@ -1,4 +1,4 @@
-// The real server among clients that compress what they send: it inflates nothing, of any size.
+// The real server among clients that compress their requests: it inflates nothing, of any size.
 #include <memory>
 #include <string>
 #include <vector>
@@ -20,7 +20,7 @@ using ::testing::HasSubstr;
 
 constexpr grpc_compression_algorithm kAlgorithms[] = {GRPC_COMPRESS_GZIP, GRPC_COMPRESS_DEFLATE};
 
-// What the server takes without any work, and some room; far less than one bomb inflated.
+// The server's memory without any work, and some room; far less than one bomb inflated.
 constexpr uint64_t kMostMemory = uint64_t{128} << 20;
 constexpr size_t kBombMiB = 192;
 

@@ -1,4 +1,4 @@
-// What a connection may do until it is shut, with pairs of sockets in the place of connections.
+// The limits of a connection, beyond which it is shut, with pairs of sockets in the place of connections.
 #include "server/network/connections.h"
 
 #include <arpa/inet.h>
@@ -88,7 +88,7 @@ class ConnectionsTest : public ::testing::Test {
     }
   }
 
-  // Twice: what is there for a moment does not count.
+  // Twice: bytes that are there for a moment do not count.
   void Look() {
     connections_.ShutUnclaimed();
     connections_.ShutUnclaimed();
@@ -321,7 +321,7 @@ TEST_F(ConnectionsTest, WhatCallsClaimIsNotBounded) {
     ASSERT_FALSE(peer.IsShut()) << i;
   }
   EXPECT_EQ(connections_.UnclaimedBytes(), 0u);
-  // What was claimed is no credit.
+  // Claims beyond the bytes that came are no credit.
   Connections::Claim(*connection, 10 * Connections::kMostUnclaimed);
   Look();
   peer.Send(Connections::kMostUnclaimed + kBeginning + kLittle);
@@ -348,7 +348,7 @@ TEST_P(ConnectionsOfCallers, MayHaveMessagesUnderWayIfTheyAreKnown) {
 
 INSTANTIATE_TEST_SUITE_P(Both, ConnectionsOfCallers, ::testing::Bool());
 
-// Windows have grown with what came before, and calls are read before they begin.
+// Windows have grown with the bytes before, and calls are read before they begin.
 TEST_F(ConnectionsTest, MoreMayBeUnderWayWhereMessagesHaveCome) {
   constexpr int64_t kMessage = int64_t{1} << 20;
   SendingPeer peer(connections_, 1);

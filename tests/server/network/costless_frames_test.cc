@@ -1,5 +1,5 @@
-// The real server among peers that send without end what costs them nothing: it shuts them, stays small, and serves all
-// others. And among peers that send much of what it wants, of which it shuts none. WELLSPACE_FLOOD_SECONDS says how
+// The real server among peers that send endless frames without cost: it shuts them, stays small, and serves all
+// others. And among peers that send much useful data, of which it shuts none. WELLSPACE_FLOOD_SECONDS says how
 // long each flood lasts, on new connections; 0: until the first is shut.
 #include <memory>
 #include <optional>
@@ -34,7 +34,7 @@ const absl::Duration kFlood = absl::Seconds(test::Amount("WELLSPACE_FLOOD_SECOND
 [[maybe_unused]] constexpr uint64_t kMostMemoryOfNamedHeaders = uint64_t{1} << 30;
 constexpr int kPatienceSeconds = 5;
 [[maybe_unused]] constexpr absl::Duration kServedWithin = absl::Seconds(1);
-// Of one connection, with what waits in the buffers of the system. Far more, and it is not shut.
+// Of one connection, with bytes that wait in the buffers of the system. Far more, and it is not shut.
 constexpr uint64_t kMostSent = uint64_t{512} << 20;
 
 constexpr char kMesh[] = "/wellspace.v1.MeshingService/MeshPoints";
@@ -89,7 +89,7 @@ struct Flooded {
 };
 
 // Sends the frames of `kind` as fast as they are taken. Ends when the server closes the connection or takes no more, or
-// `end` has come. What comes back is read, or not.
+// `end` has come. The answers are read, or not.
 Flooded Flood(const std::string& address, const Kind& kind, bool reads, absl::Time end) {
   constexpr size_t kPiece = size_t{256} << 10;
   RawConnection connection(address);
@@ -154,7 +154,7 @@ INSTANTIATE_TEST_SUITE_P(All, CostlessFrames,
                                                std::get<2>(test.param) ? "Read" : "Unread");
                          });
 
-// What is held back on many connections, each of which has less than is too much.
+// Bytes that are held back on many connections, each of which has less than the limit.
 TEST(CostlessFramesOfMany, AreCutOffTogether) {
   constexpr uint64_t kEach = uint64_t{400} << 10;
   constexpr int kConnections = 40;
@@ -183,7 +183,7 @@ TEST(CostlessFramesOfMany, AreCutOffTogether) {
   daemon.Stop();
 }
 
-// After each test no connection was shut, and what came is claimed but for a few bytes.
+// After each test no connection was shut, and all bytes are claimed but for a few.
 class WhatIsWanted : public ::testing::Test {
  protected:
   void SetUp() override { Start({}); }
@@ -269,7 +269,7 @@ TEST_F(WhatIsWanted, UploadsThatAreCancelledWithinAMessageAre) {
   calls.Get(request.name());
 }
 
-// As for a session that is no more: the client sends what it has until it hears of the end.
+// As for a session that is no more: the client sends its data until it hears of the end.
 TEST_F(WhatIsWanted, UploadsThatTheServerEndsAre) {
   constexpr int kUploads = 60;
   SessionCalls calls(Channel());

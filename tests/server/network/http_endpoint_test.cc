@@ -1,3 +1,4 @@
+// Paths, methods and broken requests over a real socket.
 #include "server/network/http_endpoint.h"
 
 #include <unistd.h>

@@ -1,3 +1,4 @@
+// Addresses to listen on: text and back, loopback, and what is refused.
 #include "server/network/listen_address.h"
 
 #include <string>

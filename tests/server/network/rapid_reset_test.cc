@@ -1,4 +1,4 @@
-// The real server among peers that begin calls only to give them up, as fast as they can: what it holds stays small,
+// The real server among peers that begin calls only to give them up, as fast as they can: its memory stays small,
 // others are served, and soon it is as if nothing had been. The environment may ask for more calls: WELLSPACE_STREAMS.
 #include <algorithm>
 #include <memory>
@@ -142,7 +142,7 @@ INSTANTIATE_TEST_SUITE_P(
       return path.substr(path.rfind('/') + 1);
     });
 
-// Who cancels a few calls has not done anything wrong.
+// A client that cancels a few calls has not done anything wrong.
 TEST_F(RapidResetTest, IsNotWhatAClientDoesThatCancels) {
   RawConnection connection(daemon_.address());
   ASSERT_TRUE(connection.Begin());

@@ -1,4 +1,4 @@
-// What a server shows of itself: the line of each call, metrics, channelz.
+// The observability of a server: the line of each call, metrics, channelz.
 #include <unistd.h>
 
 #include <algorithm>
@@ -18,7 +18,8 @@
 #include "gtest/gtest.h"
 #include "prometheus/text_serializer.h"
 #include "server/server.h"
-#include "server/store/ephemeral_log.h"
+#include "server/store/memory_files.h"
+#include "server/store/memory_records.h"
 #include "tests/server/http_get.h"
 #include "tests/server/raw_call.h"
 #include "tests/server/service_harness.h"
@@ -341,15 +342,15 @@ TEST_F(MetricsEndpointTest, IsAliveAndReadyWhileItServes) {
   EXPECT_THAT(HttpGet(address(), "/readyz"), AllOf(StartsWith("HTTP/1.1 200 OK\r\n"), EndsWith("\r\n\r\nready\n")));
 }
 
-// A log whose sessions come when the test says so.
-class SlowLog final : public EphemeralLog {
+// Records that come when the test says so.
+class SlowRecords final : public MemoryRecords {
  public:
-  SlowLog(Event& asked, Event& go_on) : asked_(asked), go_on_(go_on) {}
+  SlowRecords(Event& asked, Event& go_on) : asked_(asked), go_on_(go_on) {}
 
   absl::StatusOr<StoredSessions> Load() override {
     asked_.Set();
     EXPECT_TRUE(go_on_.Wait());
-    return EphemeralLog::Load();
+    return MemoryRecords::Load();
   }
 
  private:
@@ -371,7 +372,9 @@ TEST(Probes, AServerThatRestoresIsAliveAndNotReady) {
   Event go_on;
   absl::StatusOr<std::unique_ptr<Server>> server = absl::UnknownError("not started");
   std::thread starter([&] {
-    server = Server::Start(options, std::make_shared<spdlog::logger>("none"), std::make_unique<SlowLog>(asked, go_on));
+    server = Server::Start(
+        options, std::make_shared<spdlog::logger>("none"),
+        std::make_unique<SessionLog>(std::make_unique<SlowRecords>(asked, go_on), std::make_unique<MemoryFiles>()));
   });
   EXPECT_TRUE(asked.Wait());
   const std::string& address = options.observability.metrics_listen;

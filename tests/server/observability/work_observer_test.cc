@@ -1,3 +1,4 @@
+// What is counted and logged of meshes, refinements and errors.
 #include "server/observability/work_observer.h"
 
 #include <memory>

@@ -1,3 +1,4 @@
+// Every method of every service asks who calls, before anything else.
 #include "server/security/authenticator.h"
 
 #include "gmock/gmock.h"

@@ -8,7 +8,7 @@
 
 namespace wellspace::server {
 
-// Runs a line of the shell, and returns what it printed on either output.
+// Runs a line of the shell, and returns its output, of both kinds.
 std::string RunShell(const std::string& line);
 
 // Paths of PEM files.

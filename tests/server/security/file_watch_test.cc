@@ -1,3 +1,4 @@
+// Every kind of change of a watched file is noticed, and told once.
 #include "server/security/file_watch.h"
 
 #include <filesystem>
@@ -13,7 +14,7 @@ namespace {
 
 constexpr absl::Duration kInterval = absl::Milliseconds(1);
 
-// Whether a watch of `path` notices what `change` does.
+// Whether a watch of `path` notices the change by `change`.
 bool Notices(const std::string& path, const std::function<void()>& change) {
   Event changed;
   FileWatch watch({path});

@@ -47,7 +47,7 @@ class SecuredWellspaced : public ::testing::Test {
     return RunWellspace(arguments, {.input = kCloud, .environment = environment});
   }
 
-  // What `openssl s_client` says of the server.
+  // The output of `openssl s_client` about the server.
   std::string SClient(const Daemon& daemon, const std::string& flags) const {
     return RunShell(absl::StrCat("openssl s_client -connect ", daemon.address(), " -CAfile ", authority_.certificate(),
                                  " ", flags, " < /dev/null"));
@@ -115,7 +115,7 @@ TEST_F(SecuredWellspaced, SpeaksModernTlsOnly) {
     EXPECT_THAT(output, HasSubstr("Verification: OK")) << flags;
   }
   EXPECT_THAT(connect("-tls1_3"), HasSubstr("TLSv1.3"));
-  // SECLEVEL=0 has the client offer what its own defaults forbid.
+  // SECLEVEL=0 has the client offer versions that its own defaults forbid.
   for (const char* flags :
        {"-tls1 -cipher ALL:@SECLEVEL=0", "-tls1_1 -cipher ALL:@SECLEVEL=0", "-tls1_2 -cipher AES128-SHA",
         "-tls1_2 -cipher AES128-GCM-SHA256", "-tls1_2 -cipher ECDHE-ECDSA-AES128-SHA",

@@ -1,4 +1,4 @@
-// Who gets in, over real connections, and what happens when files change under a running server.
+// Clients that are let in, over real connections, and changes of files under a running server.
 #include "server/security/security.h"
 
 #include <functional>
@@ -19,13 +19,13 @@ using ::testing::HasSubstr;
 const std::string kToken(40, 'k');
 const std::string kOtherToken(40, 'o');
 
-// How a call of a client with `options` ends.
+// The end of a call by a client with `options`.
 absl::Status Call(ServiceHarness& harness, const client::ConnectOptions& options) {
   absl::StatusOr<client::Client> client = client::Connect(harness.server().address(), options);
   return client.ok() ? client->EstimateMesh({}, {}).status() : client.status();
 }
 
-// Whether `done` becomes true within a minute of asking. What is asked for happens by itself, without any event.
+// Whether `done` becomes true within a minute of asking. The state that it asks for comes by itself, without any event.
 bool Eventually(const std::function<bool()>& done) {
   const absl::Time end = absl::Now() + absl::Minutes(1);
   while (absl::Now() < end) {
@@ -79,7 +79,7 @@ TEST_F(SecurityTest, TokensAreReadAgain) {
   EXPECT_TRUE(client->EstimateMesh({}, {}).ok());
   EXPECT_TRUE(harness_->log().WaitFor("tenant=beta"));
 
-  // What is wrong changes nothing.
+  // A bad file changes nothing, nor does a missing one.
   ReplaceTokens("beta " + kToken);
   ASSERT_TRUE(harness_->log().WaitFor("tokens stay as they were"));
   EXPECT_TRUE(client->EstimateMesh({}, {}).ok());

@@ -1,3 +1,4 @@
+// Certificates and keys that are taken, and what is said of the others.
 #include "server/security/tls.h"
 
 #include "absl/strings/str_cat.h"

@@ -1,3 +1,4 @@
+// Files of tokens: whose they are, and which line is wrong; no message shows a token.
 #include "server/security/tokens.h"
 
 #include "absl/strings/str_cat.h"

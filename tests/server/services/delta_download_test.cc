@@ -1,4 +1,4 @@
-// DownloadMesh with since_revision: what comes, what is refused, and what is gone.
+// DownloadMesh with since_revision: differences that come, requests that are refused, and differences that are gone.
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -27,7 +27,7 @@ class DeltaDownloadTest : public ::testing::Test {
     calls_.reset();
     service_.reset();
     service_.emplace(FakeMesher, options, Transport::kInProcess, FakeEstimator, core::Mesher::Create, SecurityOptions(),
-                     DurableLog::Open({.folder = folder_.path()}).value());
+                     OpenDurableLog({.folder = folder_.path()}).value());
     calls_.emplace(service_->channel());
   }
 
@@ -151,7 +151,7 @@ TEST_F(DeltaDownloadTest, OfAMeshThatNoClientHasIsNotMade) {
   const uint64_t first = calls_->Refine(name).mesh_revision();
   Add(name);
   ExpectNotKept(name, first, "nor is anything since other meshes");
-  // That call was about the last mesh: what follows is kept.
+  // That call was about the last mesh: differences after it are kept.
   const uint64_t second = RevisionOf(name);
   Add(name);
   EXPECT_TRUE(Since(name, second).status.ok());

@@ -1,4 +1,4 @@
-// DownloadMesh: what comes, resuming, and what it does not mind.
+// DownloadMesh: its messages, resuming, and changes that do not disturb it.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -142,7 +142,7 @@ TEST_P(DownloadOver, BreaksOffAtRandomChunksAndGoesOnWithTheSameBytes) {
 
 TEST_P(DownloadOver, ReadersThatStopReadingAreDroppedAndCostNoMemory) {
   constexpr int kReaders = 8;
-  [[maybe_unused]] constexpr uint64_t kBytesPerReader = 8 << 20;  // what gRPC and the client's own message take
+  [[maybe_unused]] constexpr uint64_t kBytesPerReader = 8 << 20;  // of gRPC and of the client's own message
   ServiceOptions options;
   options.stall_limit = absl::Seconds(2);
   const auto harness = Start(MakeLargeMesh(10'000'000), options);
@@ -196,7 +196,7 @@ TEST_P(DownloadOver, ASlowReaderGetsItAll) {
   while (stream->Read(&response)) {
     simplices += response.chunk().simplices_size() / 4;
     if (absl::Now() - begin <= 2 * options.stall_limit) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(50));  // what makes it slow
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));  // this makes it slow
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
       ASSERT_LT(ResidentBytes(), before + kBytesPerReader);
 #endif

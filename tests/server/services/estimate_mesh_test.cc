@@ -1,4 +1,4 @@
-// EstimateMesh through the service's own code and gRPC: what it shares with MeshPoints, and its answer.
+// EstimateMesh through the service's own code and gRPC: the part that it shares with MeshPoints, and its answer.
 #include <cmath>
 #include <memory>
 #include <new>

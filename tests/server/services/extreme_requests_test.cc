@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "absl/time/time.h"
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "gtest/gtest.h"
 #include "server/wire/errors.h"
 #include "tests/server/service_harness.h"

@@ -1,4 +1,4 @@
-// Folders of sessions that earlier builds have written (tests/data/sessions), and what this build makes of them.
+// Folders of sessions that earlier builds have written (tests/data/sessions), and the states that this build finds.
 //
 //     WELLSPACE_WRITE_GOLDEN=tests/data/sessions/NAME …/server_golden_log_test --gtest_filter='*Write*'
 // writes one anew; see the README there.
@@ -15,13 +15,14 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "core/meshing_version.h"
+#include "core/meshers/meshing_version.h"
 #include "gtest/gtest.h"
 #include "proto/checksum.h"
 #include "server/store/durable_log.h"
 #include "tests/server/scripted_mesher.h"
 #include "tests/server/service_harness.h"
 #include "tests/server/session_calls.h"
+#include "tests/server/store/passing_log.h"
 #include "tests/server/store/store_support.h"
 #include "tests/server/subprocess.h"
 
@@ -33,14 +34,13 @@ namespace fs = std::filesystem;
 constexpr absl::Duration kLong = absl::Minutes(1);
 constexpr char kState[] = "state";  // the label that says which session is which
 
-// The log of a build whose core makes other meshes than this one.
-class OtherMeshesLog final : public SessionLog {
+// The records of a build whose core makes other meshes than this one.
+class OtherMeshesRecords final : public PassingRecords {
  public:
-  explicit OtherMeshesLog(std::unique_ptr<SessionLog> log) : log_(std::move(log)) {}
+  using PassingRecords::PassingRecords;
 
-  bool is_durable() const override { return log_->is_durable(); }
   absl::StatusOr<StoredSessions> Load() override {
-    absl::StatusOr<StoredSessions> stored = log_->Load();
+    absl::StatusOr<StoredSessions> stored = PassingRecords::Load();
     for (StoredSession& session : stored->sessions) {
       for (store::v1::StepRecord& step : session.steps) {
         if (step.has_refined() && step.refined().begins()) {
@@ -50,42 +50,16 @@ class OtherMeshesLog final : public SessionLog {
     }
     return stored;
   }
-  absl::Status Commit(const SessionChange& change, Survives survives) override {
-    return log_->Commit(change, survives);
-  }
-  void Forget(std::span<const AnswerKey> answers) override { log_->Forget(answers); }
-  absl::StatusOr<std::vector<store::v1::StepRecord::Features>> ReadFeatures(const std::string& session) override {
-    return log_->ReadFeatures(session);
-  }
-  absl::StatusOr<std::vector<StoredSizes>> ReadSizes(const std::string& session) override {
-    return log_->ReadSizes(session);
-  }
-  std::unique_ptr<PointStore> OpenPoints(const std::string& session, int dimension, uint64_t number,
-                                         std::vector<store::v1::StepRecord::Points> committed) override {
-    return log_->OpenPoints(session, dimension, number, std::move(committed));
-  }
-  void DropPoints(const std::string& session, uint64_t number) override { log_->DropPoints(session, number); }
-  absl::StatusOr<std::shared_ptr<MeshSnapshot>> KeepMesh(const std::string& session, uint64_t revision, core::Mesh mesh,
-                                                         const core::RunContext& context) override {
-    return log_->KeepMesh(session, revision, std::move(mesh), context);
-  }
-  absl::StatusOr<Garbage> RemoveGarbage() override { return log_->RemoveGarbage(); }
-  std::shared_ptr<MeshSnapshot> FindMesh(const std::string& session, const store::v1::SessionRecord& record) override {
-    return log_->FindMesh(session, record);
-  }
-
- private:
-  const std::unique_ptr<SessionLog> log_;
 };
 
-// A server over a folder, and what is asked of it.
+// A server over a folder, and the requests to it.
 class GoldenServer {
  public:
   GoldenServer(const std::string& folder, MesherFactory create_mesher = core::Mesher::Create,
                bool makes_other_meshes = false) {
-    std::unique_ptr<SessionLog> log = DurableLog::Open({.folder = folder}).value();
+    std::unique_ptr<SessionLog> log = OpenDurableLog({.folder = folder}).value();
     if (makes_other_meshes) {
-      log = std::make_unique<OtherMeshesLog>(std::move(log));
+      log = LogAround<OtherMeshesRecords>(std::move(log));
     }
     service_.emplace(FakeMesher, ServiceOptions{.workers = 1}, Transport::kInProcess, FakeEstimator,
                      std::move(create_mesher), SecurityOptions(), std::move(log));
@@ -164,7 +138,7 @@ class GoldenServer {
     return names;
   }
 
-  // What is said of each session: a line each.
+  // The description of each session: a line each.
   std::vector<std::string> Describe() {
     std::vector<std::string> lines;
     for (const auto& [state, name] : Sessions()) {
@@ -176,15 +150,17 @@ class GoldenServer {
       for (const v1::Operation& operation : listed.operations()) {
         absl::StrAppend(&operations, operations.empty() ? "" : ",", v1::Operation::State_Name(operation.state()));
       }
-      lines.push_back(absl::StrCat(
-          state, " revision ", session.revision(), " ", v1::Session::State_Name(session.state()), " points ",
-          session.committed_points(), " segments ", session.segment_count(), " vertices ", session.vertex_count(),
-          " simplices ", session.simplex_count(), " operations ", operations, " mesh ", MeshHash(name)));
+      lines.push_back(
+          absl::StrCat(state, " revision ", session.revision(), " ", v1::Session::State_Name(session.state()),
+                       " points ", session.committed_points(), " segments ", session.segment_count(),
+                       session.triangle_count() == 0 ? "" : absl::StrCat(" triangles ", session.triangle_count()),
+                       " vertices ", session.vertex_count(), " simplices ", session.simplex_count(), " operations ",
+                       operations, " mesh ", MeshHash(name)));
     }
     return lines;
   }
 
-  // Has all sessions with a mesh changed on: what their next meshes are.
+  // Changes all sessions with a mesh further. Returns their next meshes.
   std::vector<std::string> GoOn() {
     std::vector<std::string> lines;
     for (const auto& [state, name] : Sessions()) {
@@ -195,9 +171,17 @@ class GoldenServer {
       const int dimension = session.parameters().dimension();
       std::vector<double> points(dimension, 0.125);
       points.insert(points.end(), dimension, 0.25);
-      const grpc::Status added = Add(name, points);
-      EXPECT_TRUE(added.ok()) << state << ": " << added.error_message();
-      Refine(name);
+      if (session.triangle_count() == 0) {
+        const grpc::Status added = Add(name, points);
+        EXPECT_TRUE(added.ok()) << state << ": " << added.error_message();
+        Refine(name);
+      } else {
+        // No vertices can be added to a domain in space: it is begun anew with more points.
+        calls().Upload(name, session.committed_points(), points);
+        v1::StartRefinementRequest restart = StartRequest(name, nullptr, "");
+        restart.set_restart(true);
+        EXPECT_EQ(WaitFor(calls().Start(restart).name()).state(), v1::Operation::STATE_SUCCEEDED);
+      }
       lines.push_back(absl::StrCat(state, " next ", calls().Get(name).vertex_count(), " vertices ", MeshHash(name)));
     }
     return lines;
@@ -208,9 +192,16 @@ class GoldenServer {
   std::optional<SessionCalls> calls_;
 };
 
+// Of a domain, which features bound.
 v1::MeshParameters Plane() {
   v1::MeshParameters parameters;
   parameters.set_dimension(2);
+  return parameters;
+}
+
+v1::MeshParameters Space() {
+  v1::MeshParameters parameters;
+  parameters.set_dimension(3);
   return parameters;
 }
 
@@ -220,6 +211,20 @@ std::vector<std::string> RepeatRequests(GoldenServer& server, const std::string&
   EXPECT_TRUE(server.Add(refined, {0.5, 0.25}, "add", &added).ok());
   return {absl::StrCat("add ", added.ShortDebugString()),
           absl::StrCat("start ", server.calls().Start(GoldenServer::StartRequest(refined, nullptr, "start")).name())};
+}
+
+// The insides of surfaces, before and after their refinement.
+void WriteSolids(GoldenServer& server) {
+  const std::string solid = server.Create("solid", Space());
+  server.calls().Upload(solid, 0, BlockPoints());
+  server.calls().AddTriangles({BlockRequest(solid)});
+  server.Refine(solid);
+  v1::MeshParameters finer = Space();
+  finer.mutable_surface()->set_edge_length(0.5);
+  server.Refine(solid, &finer);
+  const std::string open_solid = server.Create("open-solid", Space());
+  server.calls().Upload(open_solid, 0, BlockPoints());
+  server.calls().AddTriangles({BlockRequest(open_solid)});
 }
 
 void WriteUndisturbed(GoldenServer& server) {
@@ -274,6 +279,7 @@ void WriteUndisturbed(GoldenServer& server) {
   const std::string open_domain = server.Create("open-domain", Plane());
   server.calls().Upload(open_domain, 0, FramePoints());
   server.calls().AddSegments({FrameRequest(open_domain)});
+  WriteSolids(server);
 }
 
 // An operation of one session is cancelled, one of another left to the next process.
@@ -304,7 +310,7 @@ std::string Join(const std::vector<std::string>& lines) {
   return text;
 }
 
-// What a server over a folder makes of it, which changes the folder. The first line says which meshes.
+// The text of all that a server makes of a folder, which it changes. The first line names the version of meshes.
 std::string WhatBecomesOf(const std::string& folder) {
   GoldenServer server(folder);
   std::string text = absl::StrCat("meshing version ", core::kMeshingVersion, "\n");
@@ -369,7 +375,7 @@ TEST(GoldenLog, SessionsOfEarlierBuildsAreThereAndGoOnToTheSameMeshes) {
     }
     const TestFolder folder;
     EXPECT_EQ(WhatBecomesOf(CopyOf(golden, folder)), expected)
-        << "if other meshes are meant to be made, core/meshing_version.h has to be raised";
+        << "if other meshes are meant to be made, core/meshers/meshing_version.h has to be raised";
   }
 }
 

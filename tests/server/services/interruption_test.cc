@@ -219,7 +219,7 @@ TEST(SlowReader, IsNotDroppedAsLongAsItReads) {
   v1::MeshPointsResponse response;
   while (call.Read(&response)) {
     if (absl::Now() - begin <= options.stall_limit) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(100));  // what makes it slow
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));  // this makes it slow
     }
   }
   EXPECT_GT(absl::Now() - begin, options.stall_limit);

@@ -23,7 +23,7 @@ constexpr absl::Duration kLong = absl::Minutes(1);
 constexpr size_t kPoints = 112'000;  // one session of as many fits, and not two
 constexpr size_t kFew = 100'000;     // of two such sessions one has its mesh while the other has its tree
 
-// A server, and what two users do there.
+// A server, and the calls of two users.
 class MemoryPressureTest : public ::testing::Test {
  protected:
   // Without memory: as much as they want.
@@ -31,7 +31,7 @@ class MemoryPressureTest : public ::testing::Test {
     std::unique_ptr<SessionLog> log;
     if (is_durable) {
       folder_.emplace();
-      log = DurableLog::Open({.folder = folder_->path()}).value();
+      log = OpenDurableLog({.folder = folder_->path()}).value();
     }
     service_.emplace(core::MeshPoints, ServiceOptions{.workers = 2, .max_memory_bytes = max_memory_bytes},
                      Transport::kInProcess, FakeEstimator, core::Mesher::Create, SecurityOptions(), std::move(log));

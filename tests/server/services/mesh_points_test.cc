@@ -48,7 +48,7 @@ grpc::Status Mesh(TestCall& call, const v1::MeshParameters& parameters, const st
   return call.Finish();
 }
 
-// The answer to a call that succeeded is what the proto promises.
+// The answer to a call that succeeded keeps the guarantees of the proto.
 void ExpectWellFormed(const TestCall& call) {
   ASSERT_EQ(call.metadata.size(), 1u);
   const v1::MeshMetadata& metadata = call.metadata.front();

@@ -1,4 +1,4 @@
-// The calls of OperationService over a channel, and what operations do to their session.
+// The calls of OperationService over a channel, and the effects of operations on their session.
 #include <chrono>
 #include <future>
 #include <mutex>
@@ -306,7 +306,7 @@ TEST_F(OperationServiceTest, DeletingASessionCancelsItsOperation) {
 TEST_F(OperationServiceTest, ProgressIsSteadyAndNeverGoesBack) {
   const std::string name = MakeSession();
   script_.Set([](core::Phase phase, core::RunContext& context) {
-    // What would be too many events, then nothing to tell.
+    // More progress than there may be events, then nothing to tell.
     const absl::Time begin = absl::Now();
     for (int i = 0; absl::Now() - begin < absl::Milliseconds(phase == core::Phase::kRefinement ? 2500 : 400); ++i) {
       if (phase != core::Phase::kRefinement) {

@@ -25,7 +25,7 @@ class RemovePointsTest : public ::testing::TestWithParam<bool> {
   void Start() {
     std::unique_ptr<SessionLog> log;
     if (GetParam()) {
-      log = DurableLog::Open({.folder = folder_.path()}).value();
+      log = OpenDurableLog({.folder = folder_.path()}).value();
     }
     service_.emplace(FakeMesher, options_, Transport::kInProcess, FakeEstimator, core::Mesher::Create,
                      SecurityOptions(), std::move(log));
@@ -226,12 +226,16 @@ TEST_P(RemovePointsTest, FilesThatAreNeededNoMoreGo) {
   }
   const DataPaths paths{folder_.path()};
   const std::string name = SessionWith(UniformPoints(100, 2, 11));
-  uint64_t last = 0;
+  store::v1::PointsFile last;
+  last.set_number(1);
+  last.set_epoch(1);
   for (int i = 0; i < 3; ++i) {
-    const uint64_t revision = Remove(name, {0, 5}).revision();
+    store::v1::PointsFile file;
+    file.set_number(Remove(name, {0, 5}).revision());
+    file.set_epoch(i + 1);  // each process has the next one
     EXPECT_FALSE(PosixFileSystem().Open(paths.points(name, last), FileSystem::Mode::kRead).ok());
-    EXPECT_TRUE(PosixFileSystem().Open(paths.points(name, revision), FileSystem::Mode::kRead).ok());
-    last = revision;
+    EXPECT_TRUE(PosixFileSystem().Open(paths.points(name, file), FileSystem::Mode::kRead).ok());
+    last = file;
     Restart();
     EXPECT_EQ(calls().Get(name).committed_points(), 98u - 2 * i);
   }

@@ -8,6 +8,7 @@
 #include "absl/synchronization/notification.h"
 #include "gtest/gtest.h"
 #include "server/store/check_data.h"
+#include "server/store/data_folder.h"
 #include "server/store/durable_log.h"
 #include "server/wire/errors.h"
 #include "tests/server/scripted_mesher.h"
@@ -22,15 +23,15 @@ namespace {
 constexpr absl::Duration kLong = absl::Minutes(1);
 
 // Has no room for the first deletions.
-class FullLog final : public PassingLog {
+class FullRecords final : public PassingRecords {
  public:
-  FullLog(std::unique_ptr<DurableLog> log, int refusals) : PassingLog(*log), log_(std::move(log)), left_(refusals) {}
+  FullRecords(std::shared_ptr<SessionLog> log, int refusals) : PassingRecords(std::move(log)), left_(refusals) {}
 
-  absl::Status Commit(const SessionChange& change, Survives survives) override {
+  absl::Status Apply(const SessionChange& change, Survives survives) override {
     if (change.is_deletion && left_-- > 0) {
       return MakeError(v1::ERROR_REASON_DISK_FULL, "no room");
     }
-    absl::Status status = PassingLog::Commit(change, survives);
+    absl::Status status = PassingRecords::Apply(change, survives);
     if (change.is_deletion && status.ok()) {
       is_deleted_.Notify();
     }
@@ -39,7 +40,6 @@ class FullLog final : public PassingLog {
   bool WaitUntilDeleted() { return is_deleted_.WaitForNotificationWithTimeout(kLong); }
 
  private:
-  const std::unique_ptr<DurableLog> log_;
   std::atomic<int> left_;
   absl::Notification is_deleted_;
 };
@@ -55,7 +55,7 @@ class RestartTest : public ::testing::Test {
   }
 
   void Start(MesherFactory create_mesher = core::Mesher::Create) {
-    absl::StatusOr<std::unique_ptr<DurableLog>> log = DurableLog::Open({.folder = folder_.path()});
+    absl::StatusOr<std::unique_ptr<SessionLog>> log = OpenDurableLog({.folder = folder_.path()});
     ASSERT_TRUE(log.ok()) << log.status();
     StartOn(*std::move(log), std::move(create_mesher));
   }
@@ -71,7 +71,7 @@ class RestartTest : public ::testing::Test {
     service_.reset();
   }
 
-  // Ends the server, and starts it again. What runs is given up, as after SIGTERM.
+  // Ends the server, and starts it again. Running work is given up, as after SIGTERM.
   void Restart(MesherFactory create_mesher = core::Mesher::Create) {
     Stop();
     Start(std::move(create_mesher));
@@ -191,7 +191,7 @@ TEST_F(RestartTest, UploadsGoOnAndNothingIsTakenTwice) {
   EXPECT_EQ(DetailsOf(status).reason, "UPLOAD_MISMATCH");
 }
 
-// The life of a session, with a restart wherever `restarts` has its bit; what it ends with.
+// The life of a session, with a restart wherever `restarts` has its bit; its end is compared.
 TEST_F(RestartTest, WhateverTheRestartsTheMeshesAreTheSameToTheBit) {
   const auto live = [&](uint32_t restarts) {
     int step = 0;
@@ -252,6 +252,36 @@ TEST_F(RestartTest, DomainsComeBackWithTheirSegments) {
   EXPECT_EQ(Seen(domain), before);
   calls().Refine(domain);
   EXPECT_EQ(MeshOf(domain), MeshOf(other));
+}
+
+TEST_F(RestartTest, SurfacesComeBackWithTheirTrianglesAndSeeds) {
+  Start();
+  v1::CreateSessionRequest create;
+  create.mutable_parameters()->set_dimension(3);
+  const std::string block = calls().Create(create).name();
+  const std::string other = calls().Create(create).name();
+  for (const std::string& one : {block, other}) {
+    calls().Upload(one, 0, BlockPoints());
+    calls().AddTriangles({BlockRequest(one)});
+  }
+  calls().Refine(other);
+  const std::string before = Seen(block);
+  Restart();
+  EXPECT_EQ(Seen(block), before);
+  const v1::AddTrianglesResponse again = calls().AddTriangles({BlockRequest(block)});
+  EXPECT_EQ(again.triangle_count(), 12u);
+  EXPECT_EQ(Seen(block), before) << "all is known, and nothing changes";
+  calls().Refine(block);
+  EXPECT_EQ(MeshOf(block), MeshOf(other));
+  Restart();
+  for (const std::string& one : {block, other}) {
+    v1::StartRefinementRequest finer;
+    finer.set_name(one);
+    finer.mutable_parameters()->set_dimension(3);
+    finer.mutable_parameters()->mutable_surface()->set_edge_length(0.25);
+    EXPECT_EQ(calls().Refine(finer).state(), v1::Operation::STATE_SUCCEEDED);
+  }
+  EXPECT_EQ(MeshOf(block), MeshOf(other)) << "their structures are built again";
 }
 
 TEST_F(RestartTest, DomainsComeBackWithTheirGroupsAndDistances) {
@@ -453,9 +483,11 @@ TEST_F(RestartTest, WhatAClientHasCancelledIsNotTakenUpAgain) {
 
 // Its end is written down once there is room, not only by the next start.
 TEST_F(RestartTest, ASessionThatExpiresOnAFullDiskIsFreedLater) {
-  auto log = std::make_unique<FullLog>(DurableLog::Open({.folder = folder_.path()}).value(), /*refusals=*/2);
-  FullLog& full = *log;
-  StartOn(std::move(log));
+  std::shared_ptr<SessionLog> log = OpenDurableLog({.folder = folder_.path()}).value();
+  auto records = std::make_unique<FullRecords>(log, /*refusals=*/2);
+  FullRecords& full = *records;
+  auto files = std::make_unique<PassingFiles>(std::exchange(log, nullptr));
+  StartOn(std::make_unique<SessionLog>(std::move(records), std::move(files)));
   v1::CreateSessionRequest request;
   *request.mutable_parameters() = UnitCubeParameters(2);
   request.mutable_ttl()->set_seconds(1);
@@ -472,7 +504,7 @@ TEST_F(RestartTest, ADamagedMeshCostsItsSessionAlone) {
   const uint64_t revision = calls().Refine(damaged).mesh_revision();
   calls().Refine(other);
   Stop();
-  const std::string path = DataPaths{folder_.path()}.mesh(damaged, revision);
+  const std::string path = DataPaths{folder_.path()}.mesh(damaged, revision, /*epoch=*/1);
   FlipBit(path, 100, 3);
   Start();
   const Download download = calls().DownloadMesh(damaged);

@@ -1,4 +1,4 @@
-// Sessions of domains in the plane: AddSegments, and what comes of it.
+// Sessions of domains in the plane: AddSegments, and its effects.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -73,7 +73,7 @@ class SegmentsTest : public ::testing::Test {
   grpc::Status status_;
 };
 
-// What MeshPoints makes of the frame.
+// The mesh that MeshPoints makes of the frame.
 Download MeshFrame(v1::MeshingService::Stub& stub) {
   grpc::ClientContext context;
   const auto stream = stub.MeshPoints(&context);
@@ -344,7 +344,7 @@ TEST_F(SegmentsTest, WhatBoundsNoDomainFailsTheOperationAndOtherRulesHelp) {
   const std::string name = Create();
   calls_.Upload(name, 0, FramePoints());
   v1::AddSegmentsRequest crossed = FrameRequest(name);
-  for (const uint32_t end : {4, 6, 5, 7}) {  // from corner to corner of what was the hole
+  for (const uint32_t end : {4, 6, 5, 7}) {  // from corner to corner of the former hole
     crossed.mutable_segments()->add_ends(end);
   }
   crossed.mutable_segments()->mutable_markers()->Resize(12, 0);
@@ -430,7 +430,7 @@ TEST_F(LimitedSegmentsTest, SegmentsAndSeedsAreCountedAsPointsAre) {
   more.set_segment_offset(0);
   more.mutable_segments()->mutable_ends()->Resize(12, 0);
   ExpectRefused(more, grpc::StatusCode::RESOURCE_EXHAUSTED, "QUOTA_EXCEEDED", "");
-  EXPECT_THAT(status_.error_message(), HasSubstr("26 points, segments and seeds"));
+  EXPECT_THAT(status_.error_message(), HasSubstr("26 points, segments, triangles and seeds"));
   calls_.Delete(name);
   EXPECT_EQ(calls_.AddSegments({more}).segment_count(), 6u) << "a deleted session has none";
 }

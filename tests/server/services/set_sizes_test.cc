@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "tests/server/scripted_mesher.h"
@@ -74,7 +74,7 @@ class SetSizesTest : public ::testing::Test {
   SessionCalls calls_;
 };
 
-// What MeshPoints makes of the points of Create and these sizes.
+// The mesh that the core makes of the points of Create and these sizes in one call.
 core::Mesh MeshAtOnce(const std::vector<double>& points, const std::vector<double>& sizes) {
   core::MeshParameters parameters{.dimension = 2, .domain_low = {0, 0}, .domain_high = {1, 1}};
   parameters.size_samples = std::make_shared<const core::SizeSamples>(

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "core/validate/validate.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
@@ -95,7 +95,7 @@ TEST_F(SizeSamplesTest, ComeInManyMessages) {
   const core::SizeSamples samples{points, sizes};
   EXPECT_EQ(core::ValidateSizing({2, result.points, result.simplices}, {.samples = &samples, .gradation = 0.5}),
             absl::OkStatus());
-  // To the bit what the core makes of all of them.
+  // To the bit the mesh that the core makes of all of them.
   core::MeshParameters parameters{.dimension = 2};
   parameters.size_samples = std::make_shared<core::SizeSamples>(samples);
   parameters.gradation = 0.5;

@@ -1,4 +1,4 @@
-// Most bytes that the sessions of a tenant keep: what counts, what is refused, what frees, also after a restart.
+// The quota of a tenant's stored bytes: data that count, calls refused, calls that free some, also after a restart.
 #include <optional>
 #include <string>
 #include <utility>
@@ -33,7 +33,7 @@ class StorageQuotaTest : public ::testing::TestWithParam<bool> {
   void Start() {
     std::unique_ptr<SessionLog> log;
     if (GetParam()) {
-      absl::StatusOr<std::unique_ptr<DurableLog>> opened = DurableLog::Open({.folder = folder_.path()});
+      absl::StatusOr<std::unique_ptr<SessionLog>> opened = OpenDurableLog({.folder = folder_.path()});
       ASSERT_TRUE(opened.ok()) << opened.status();
       log = *std::move(opened);
     }
@@ -58,7 +58,7 @@ class StorageQuotaTest : public ::testing::TestWithParam<bool> {
     return name;
   }
 
-  // What the last mesh of a session counts.
+  // The bytes that the last mesh of a session counts.
   static uint64_t MeshBytes(const v1::Session& session) {
     return session.vertex_count() * kPointBytes + session.simplex_count() * 3 * sizeof(uint32_t);
   }
@@ -206,7 +206,7 @@ TEST_P(StorageQuotaTest, IsAsItWasAfterARestart) {
   Start();
   EXPECT_EQ(Stored(), stored);
   EXPECT_EQ(StoredOf(name), of_session);
-  // With less than what is there, nothing more is taken, and what is there stays.
+  // With a limit below the stored bytes, nothing more is taken, and the stored data stay.
   Stop();
   options_.max_stored_bytes_per_tenant = stored / 2;
   Start();

@@ -70,7 +70,7 @@ class TenantsTest : public ::testing::Test {
     return client::Connect(harness_.server().address(), {.token = token}).value();
   }
 
-  // How one call of `method` about `name` ends for beta.
+  // The end of one call of `method` about `name` by beta.
   grpc::Status CallAsBeta(const google::protobuf::MethodDescriptor& method, const std::string& name) {
     const std::unique_ptr<google::protobuf::Message> request(
         google::protobuf::MessageFactory::generated_factory()->GetPrototype(method.input_type())->New());
@@ -84,7 +84,7 @@ class TenantsTest : public ::testing::Test {
     return CallUnary(harness_.channel(), path, request->SerializeAsString(), context).status;
   }
 
-  // Puts `name` where the request says what it is about.
+  // Puts `name` into the request's field for the name.
   static void SetName(google::protobuf::Message& request, const std::string& name) {
     const google::protobuf::Reflection& reflection = *request.GetReflection();
     for (const char* field_name : {"name", "parent"}) {
@@ -135,7 +135,7 @@ std::string Unused(std::string name) {
 
 TEST_F(TenantsTest, AnothersSessionIsAsIfThereWereNone) {
   const client::Session before = acme_.GetSession(session_).value();
-  ASSERT_THAT(Methods(), SizeIs(18));
+  ASSERT_THAT(Methods(), SizeIs(19));
   for (const google::protobuf::MethodDescriptor* method : Methods()) {
     const std::string& name = NameFor(*method);
     const std::string unused = Unused(name);

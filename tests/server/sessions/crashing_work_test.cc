@@ -13,7 +13,7 @@
 namespace wellspace::server {
 namespace {
 
-constexpr int kSessions = 30;  // within what a tenant may have in line
+constexpr int kSessions = 30;  // within the jobs that a tenant may have in line
 constexpr int kWorkers = 4;
 
 // The processes of a server that has `poison` of its operations die of them, until none is under way any more.

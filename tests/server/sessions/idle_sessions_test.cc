@@ -1,4 +1,4 @@
-// Which idle sessions give up their structure, and what becomes of them.
+// Idle sessions that give up their structure, and their state afterwards.
 #include "server/sessions/idle_sessions.h"
 
 #include <algorithm>
@@ -14,7 +14,7 @@
 #include "server/sessions/session_registry.h"
 #include "server/sessions/session_use.h"
 #include "server/store/durable_log.h"
-#include "server/store/ephemeral_log.h"
+#include "server/store/session_log.h"
 #include "spdlog/logger.h"
 #include "tests/server/scripted_mesher.h"
 #include "tests/server/store/store_support.h"
@@ -101,8 +101,8 @@ class IdleSessionsTest : public ::testing::Test {
   static constexpr uint64_t kStructure = 20 * kMegabyte;
 
   explicit IdleSessionsTest(std::unique_ptr<SessionLog> log = nullptr)
-      : log_(log != nullptr ? std::move(log) : DurableLog::Open({.folder = folder_.path()}).value()) {
-    (void)log_->Load();
+      : log_(log != nullptr ? std::move(log) : OpenDurableLog({.folder = folder_.path()}).value()) {
+    (void)log_->records().Load();
   }
 
   std::shared_ptr<Session> Create() {
@@ -243,7 +243,7 @@ TEST_F(IdleSessionsTest, DifferencesOfMeshesAreGivenUpToo) {
 
 class EphemeralIdleSessionsTest : public IdleSessionsTest {
  protected:
-  EphemeralIdleSessionsTest() : IdleSessionsTest(std::make_unique<EphemeralLog>()) {}
+  EphemeralIdleSessionsTest() : IdleSessionsTest(MakeEphemeralLog()) {}
 };
 
 TEST_F(EphemeralIdleSessionsTest, NeverGiveUp) {

@@ -1,3 +1,4 @@
+// When a lease runs out, by a clock of the test.
 #include "server/sessions/lease.h"
 
 #include "gtest/gtest.h"

@@ -1,4 +1,4 @@
-// Which differences between its meshes a session keeps.
+// The differences between its meshes that a session keeps.
 #include "server/sessions/mesh_deltas.h"
 
 #include <memory>

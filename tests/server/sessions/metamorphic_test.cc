@@ -23,6 +23,7 @@
 #include "server/store/durable_log.h"
 #include "spdlog/logger.h"
 #include "tests/server/service_harness.h"
+#include "tests/server/session_calls.h"
 #include "tests/server/store/store_support.h"
 #include "tests/support/amount.h"
 #include "tests/support/seeded_test.h"
@@ -36,7 +37,7 @@ const int kVariations = test::Amount("WELLSPACE_VARIATIONS", 6);
 
 // A step of a life.
 struct LifeStep {
-  enum class Kind { kUpload, kRefine, kAdd, kSetSizes, kRemove } kind = Kind::kUpload;
+  enum class Kind { kUpload, kAddTriangles, kRefine, kAdd, kSetSizes, kRemove } kind = Kind::kUpload;
   std::vector<double> points{};  // of kUpload, kAdd and kSetSizes
   double size = 0;               // of kRefine
   bool restart = false;          // of kRefine
@@ -45,23 +46,33 @@ struct LifeStep {
 
 struct Life {
   int dimension = 2;
+  bool is_block = false;  // the inside of BlockRequest, whose corners are the first points
   std::vector<LifeStep> steps;
 };
 
-std::vector<double> DrawPoints(test::SplitMix64& random, uint64_t count, int dimension) {
-  std::vector<double> points(count * dimension);
-  std::ranges::generate(points, [&] { return 0.05 + 0.9 * random.Unit(); });
+std::vector<double> DrawPoints(test::SplitMix64& random, uint64_t count, const Life& life) {
+  std::vector<double> points(count * life.dimension);
+  const double low = life.is_block ? -0.45 : 0.05;
+  std::ranges::generate(points, [&] { return low + 0.9 * random.Unit(); });
   return points;
 }
 
-Life DrawLife(test::SplitMix64& random) {
-  Life life{.dimension = random.Below(3) == 0 ? 3 : 2, .steps = {}};
+Life DrawLife(test::SplitMix64& random, bool is_block) {
+  Life life{.dimension = is_block || random.Below(3) == 0 ? 3 : 2, .is_block = is_block, .steps = {}};
+  if (is_block) {
+    life.steps.push_back({.kind = LifeStep::Kind::kUpload, .points = BlockPoints()});
+    life.steps.push_back({.kind = LifeStep::Kind::kAddTriangles});
+  }
+  // No points are added to the mesh of the block: it is begun anew with those that have come.
+  bool begins_anew = false;
   const auto upload = [&] {
-    life.steps.push_back(
-        {.kind = LifeStep::Kind::kUpload, .points = DrawPoints(random, 1 + random.Below(60), life.dimension)});
+    life.steps.push_back({.kind = LifeStep::Kind::kUpload, .points = DrawPoints(random, 1 + random.Below(60), life)});
+    begins_anew = is_block;
   };
   const auto refine = [&] {
-    life.steps.push_back({.kind = LifeStep::Kind::kRefine, .size = random.Below(2) == 0 ? 0 : 0.15 + random.Unit()});
+    life.steps.push_back({.kind = LifeStep::Kind::kRefine,
+                          .size = random.Below(2) == 0 ? 0 : 0.15 + random.Unit(),
+                          .restart = std::exchange(begins_anew, false)});
   };
   upload();
   refine();
@@ -77,16 +88,18 @@ Life DrawLife(test::SplitMix64& random) {
         life.steps.push_back({.kind = LifeStep::Kind::kRefine, .size = 0.3, .restart = true});
         break;
       case 3:
-        life.steps.push_back(
-            {.kind = LifeStep::Kind::kSetSizes, .points = DrawPoints(random, random.Below(4), life.dimension)});
+        life.steps.push_back({.kind = LifeStep::Kind::kSetSizes, .points = DrawPoints(random, random.Below(4), life)});
         break;
       case 4:
         life.steps.push_back({.kind = LifeStep::Kind::kRemove, .one_of = 2 + random.Below(8)});
         refine();  // nothing can be added before
         break;
       default:
-        life.steps.push_back(
-            {.kind = LifeStep::Kind::kAdd, .points = DrawPoints(random, 1 + random.Below(5), life.dimension)});
+        if (is_block) {
+          upload();
+          break;
+        }
+        life.steps.push_back({.kind = LifeStep::Kind::kAdd, .points = DrawPoints(random, 1 + random.Below(5), life)});
     }
   }
   refine();
@@ -97,7 +110,7 @@ Life DrawLife(test::SplitMix64& random) {
 class Process {
  public:
   explicit Process(const std::string& folder)
-      : backend_({.workers = 2}, authenticator_, observability_, logger_, DurableLog::Open({.folder = folder}).value(),
+      : backend_({.workers = 2}, authenticator_, observability_, logger_, OpenDurableLog({.folder = folder}).value(),
                  FakeMesher, FakeEstimator, core::Mesher::Create) {
     EXPECT_TRUE(backend_.Restore().ok());
   }
@@ -127,7 +140,7 @@ class Process {
 // Lives a life in a folder of its own.
 class Living {
  public:
-  // `random`: what is varied; null: nothing.
+  // `random`: for the variations of the life; null: there are none.
   Living(const Life& life, test::SplitMix64* random) : life_(life), random_(random) { Restart(); }
 
   // Of the last mesh.
@@ -140,6 +153,9 @@ class Living {
       switch (step.kind) {
         case LifeStep::Kind::kUpload:
           Upload(step.points);
+          break;
+        case LifeStep::Kind::kAddTriangles:
+          AddTriangles();
           break;
         case LifeStep::Kind::kRefine:
           Refine(step.size, step.restart);
@@ -174,8 +190,10 @@ class Living {
 
   core::MeshParameters Parameters(double size) {
     core::MeshParameters parameters{.dimension = life_.dimension};
-    parameters.domain_low.assign(life_.dimension, 0);
-    parameters.domain_high.assign(life_.dimension, 1);
+    if (!life_.is_block) {
+      parameters.domain_low.assign(life_.dimension, 0);
+      parameters.domain_high.assign(life_.dimension, 1);
+    }
     parameters.max_circumradius = size;
     parameters.threads = random_ == nullptr ? 1 : static_cast<int>(1 + random_->Below(3));
     return parameters;
@@ -191,7 +209,7 @@ class Living {
     }
   }
 
-  // What leaves nothing behind.
+  // Disturbances that leave nothing behind.
   void Disturb() {
     if (Draw(4)) {
       what_ += " restart";
@@ -255,6 +273,22 @@ class Living {
     EXPECT_TRUE(session_->CommitPoints().ok());
   }
 
+  // Those of the block, all at once or in pieces that overlap.
+  void AddTriangles() {
+    const v1::AddTrianglesRequest request = BlockRequest("");
+    FeaturePart part;
+    *part.mutable_triangles() = request.triangles();
+    *part.mutable_surface() = request.surface();
+    if (const uint64_t early = random_ == nullptr ? 0 : random_->Below(12); early > 0) {
+      FeaturePart first = part;
+      first.mutable_triangles()->mutable_corners()->Truncate(static_cast<int>(3 * early));
+      first.mutable_triangles()->mutable_markers()->Truncate(static_cast<int>(early));
+      EXPECT_TRUE(session_->AddFeatures(first, {}, 0).ok());
+      Disturb();
+    }
+    EXPECT_TRUE(session_->AddFeatures(part, {}, 0).ok());
+  }
+
   // A set of sizes, 0.04 at each point; none without any.
   void SetSizes(const std::vector<double>& points) {
     std::shared_ptr<core::SizeSamples> samples;
@@ -269,7 +303,8 @@ class Living {
   // All points at once, or the last of them first.
   void Remove(uint64_t one_of) {
     std::vector<uint64_t> numbers;
-    for (uint64_t i = 0; i < session_->state()->record.points(); i += one_of) {
+    const uint64_t first_free = life_.is_block ? BlockPoints().size() / 3 : 0;
+    for (uint64_t i = first_free; i < session_->state()->record.points(); i += one_of) {
       numbers.push_back(i);
     }
     const uint64_t first = random_ == nullptr ? 0 : random_->Below(numbers.size() + 1);
@@ -334,7 +369,7 @@ class MetamorphicTest : public test::SeededTest {
 TEST_F(MetamorphicTest, TheSameStepsEndWithTheSameMesh) {
   std::set<uint32_t> hashes;
   for (int i = 0; i < kLives; ++i) {
-    const Life life = DrawLife(random_);
+    const Life life = DrawLife(random_, /*is_block=*/i % 3 == 2);
     const uint32_t undisturbed = Living(life, nullptr).Hash();
     hashes.insert(undisturbed);
     for (int variation = 0; variation < kVariations; ++variation) {

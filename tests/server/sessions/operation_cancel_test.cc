@@ -12,7 +12,7 @@
 #include "server/backend.h"
 #include "server/network/connections.h"
 #include "server/sessions/refinement.h"
-#include "server/store/ephemeral_log.h"
+#include "server/store/session_log.h"
 #include "spdlog/logger.h"
 #include "tests/server/service_harness.h"
 
@@ -35,7 +35,7 @@ class OperationCancelTest : public ::testing::Test {
     return environment().jobs.Submit({.tenant = "a", .work = std::move(work)}).value();
   }
 
-  // What `job` does for `operation`: it works until it is cancelled. False: it never hears of that.
+  // The work of `job` for `operation`: it goes on until it is cancelled. False: it never hears of that.
   bool WorkUntilCancelled(Operation& operation, Job& job) {
     std::optional<SessionWork> work;
     if (operation.SetJob(job.shared_from_this())) {
@@ -60,17 +60,17 @@ class OperationCancelTest : public ::testing::Test {
   Authenticator authenticator_;
   Connections connections_{{}, logger_};
   Observability observability_{{}, logger_, connections_, [](const grpc::ServerContextBase&) { return ""; }};
-  Backend backend_{options_,   authenticator_, observability_,      logger_, std::make_unique<EphemeralLog>(),
-                   FakeMesher, FakeEstimator,  core::Mesher::Create};
+  Backend backend_{options_,           authenticator_, observability_, logger_,
+                   MakeEphemeralLog(), FakeMesher,     FakeEstimator,  core::Mesher::Create};
   MemoryBudget memory_{0};
-  EphemeralLog log_;
+  const std::unique_ptr<SessionLog> log_ = MakeEphemeralLog();
   const Clock clock_{.wall = [this] {
     if (const std::function<void()> now = std::exchange(at_look_, nullptr)) {
       now();
     }
     return absl::Now();
   }};
-  SessionRegistry sessions_{options_, memory_, clock_, log_};
+  SessionRegistry sessions_{options_, memory_, clock_, *log_};
   const std::shared_ptr<Session> session_ =
       sessions_.Create({.tenant = "a", .parameters = {.dimension = 2}, .labels = {}, .ttl = absl::Hours(1)}).value();
 };

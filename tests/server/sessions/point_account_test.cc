@@ -1,3 +1,4 @@
+// Points, segments, sizes and bytes against the limits of session, tenant and memory.
 #include "server/sessions/point_account.h"
 
 #include <atomic>
@@ -105,15 +106,15 @@ TEST_F(PointAccountTest, TakesAsManyAsTheMemoryHolds) {
 TEST_F(PointAccountTest, SegmentsAndSeedsCountAsPointsOfTheTenantAndTakeTheirMemory) {
   std::unique_ptr<PointAccount> account = Open(unlimited_);
   EXPECT_TRUE(account->Take(100).ok());
-  EXPECT_TRUE(account->TakeFeatures(1000, 50).ok());
+  EXPECT_TRUE(account->TakeFeatures({.segments = 1000, .seeds = 50}).ok());
   EXPECT_EQ(tenant_->amount().points, 1150u);
-  EXPECT_EQ(unlimited_.lasting(), 100 * kPointBytes + FeatureStore::BytesOf(1000, 50));
-  EXPECT_EQ(DetailsOf(account->TakeFeatures(1, 0)).reason, "TOO_MANY_POINTS");
-  EXPECT_EQ(DetailsOf(account->TakeFeatures(0, 951)).reason, "TOO_MANY_POINTS");
-  const absl::Status refused = account->TakeFeatures(0, 351);
+  EXPECT_EQ(unlimited_.lasting(), 100 * kPointBytes + FeatureBytes({.segments = 1000, .seeds = 50}));
+  EXPECT_EQ(DetailsOf(account->TakeFeatures({.segments = 1})).reason, "TOO_MANY_POINTS");
+  EXPECT_EQ(DetailsOf(account->TakeFeatures({.seeds = 951})).reason, "TOO_MANY_POINTS");
+  const absl::Status refused = account->TakeFeatures({.seeds = 351});
   EXPECT_EQ(DetailsOf(refused).reason, "QUOTA_EXCEEDED");
   EXPECT_EQ(refused.message(),
-            "your sessions would have 1501 points, segments and seeds together; they may have at most 1500");
+            "your sessions would have 1501 points, segments, triangles and seeds together; they may have at most 1500");
   EXPECT_EQ(tenant_->amount().points, 1150u);
   account->Return(100);
   account->Close();
@@ -121,8 +122,8 @@ TEST_F(PointAccountTest, SegmentsAndSeedsCountAsPointsOfTheTenantAndTakeTheirMem
   account.reset();
   EXPECT_EQ(unlimited_.reserved(), 0u);
 
-  MemoryBudget memory(kProcessMemoryBytes + FeatureStore::BytesOf(10, 0));
-  EXPECT_EQ(DetailsOf(Open(memory)->TakeFeatures(11, 0)).reason, "MEMORY_LIMIT");
+  MemoryBudget memory(kProcessMemoryBytes + FeatureBytes({.segments = 10}));
+  EXPECT_EQ(DetailsOf(Open(memory)->TakeFeatures({.segments = 11})).reason, "MEMORY_LIMIT");
 }
 
 TEST_F(PointAccountTest, SizesCountAsPointsOfTheTenantAndTakeTheirMemory) {
@@ -148,17 +149,17 @@ TEST_F(PointAccountTest, PointsInAFileTakeNoMemory) {
 
 TEST_F(PointAccountTest, WhatWasThereBeforeIsTakenWhateverTheLimits) {
   const std::unique_ptr<PointAccount> account = Open(unlimited_);
-  account->Restore({.points = options_.max_points + 1, .segments = 2, .seeds = 1});
+  account->Restore({.points = options_.max_points + 1, .features = {.segments = 2, .seeds = 1}});
   EXPECT_EQ(tenant_->amount().points, options_.max_points + 4);
   EXPECT_FALSE(account->Take(1).ok());
-  account->ReturnFeatures(2, 1);
+  account->ReturnFeatures({.segments = 2, .seeds = 1});
   account->Return(2);
   EXPECT_EQ(tenant_->amount().points, options_.max_points - 1);
   EXPECT_TRUE(account->Take(1).ok());
 }
 
 TEST_F(PointAccountTest, BytesOfATenantAreThoseOfInputsAndMeshes) {
-  in_memory_ = false;  // what is in a file counts, too
+  in_memory_ = false;  // points in a file count, too
   options_.max_stored_bytes_per_tenant = 100 * kPointBytes;
   const std::unique_ptr<PointAccount> first = Open(unlimited_);
   const std::unique_ptr<PointAccount> second = Open(unlimited_);
@@ -177,10 +178,10 @@ TEST_F(PointAccountTest, BytesOfATenantAreThoseOfInputsAndMeshes) {
                    ". What frees some: DeleteSession, RemovePoints, SetSizes without samples"));
   EXPECT_EQ(tenant_->amount().bytes, 100 * kPointBytes);
   EXPECT_EQ(DetailsOf(first->TakeSizes(1)).reason, "STORAGE_QUOTA_EXCEEDED");
-  EXPECT_EQ(DetailsOf(first->TakeFeatures(1, 0)).reason, "STORAGE_QUOTA_EXCEEDED");
+  EXPECT_EQ(DetailsOf(first->TakeFeatures({.segments = 1})).reason, "STORAGE_QUOTA_EXCEEDED");
   EXPECT_EQ(DetailsOf(second->CheckMesh(40 * kPointBytes + 1)).reason, "STORAGE_QUOTA_EXCEEDED");
   EXPECT_EQ(DetailsOf(second->TakeMesh(40 * kPointBytes + 1)).reason, "STORAGE_QUOTA_EXCEEDED");
-  // A mesh takes the place of the one before; what it has less is free once it is there.
+  // A mesh takes the place of the one before; the bytes that it has less are free once it is there.
   EXPECT_TRUE(second->TakeMesh(10 * kPointBytes).ok());
   EXPECT_FALSE(first->Take(1).ok());
   second->SettleMesh(10 * kPointBytes);

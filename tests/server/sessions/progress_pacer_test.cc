@@ -1,3 +1,4 @@
+// Which progress becomes an event, by a clock of the test.
 #include "server/sessions/progress_pacer.h"
 
 #include "gtest/gtest.h"

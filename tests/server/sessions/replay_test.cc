@@ -1,4 +1,4 @@
-// What did not succeed leaves nothing behind: a session is a function of its steps that succeeded.
+// Failed changes leave nothing behind: a session is a function of its steps that succeeded.
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -18,10 +18,10 @@
 namespace wellspace::server {
 namespace {
 
-// Calls of a mesher that change it, or what it has made.
+// Calls of a mesher that change it, or its mesh.
 enum class Call { kCreate, kAddPoints, kRefine, kExtract, kUpdate };
 
-// How a call is broken off.
+// The way in which a call is broken off.
 enum class Way { kCancel, kFail, kThrow };
 
 // Where it is: when a run in `phase` asks its lender for the `count`th time; phase kWaiting: before the
@@ -33,7 +33,7 @@ struct Break {
   Way way = Way::kCancel;
 };
 
-// What the meshers of a server do, and where they are broken off.
+// The script of a server's meshers, and the place where they are broken off.
 //
 // Thread safety: thread-safe.
 class Script {
@@ -291,7 +291,7 @@ class Replayed : public ::testing::Test {
     EXPECT_EQ(Refine(name).state(), v1::Operation::STATE_SUCCEEDED);
     return name;
   }
-  // What comes of it then.
+  // The mesh after further changes.
   Arrays End(const std::string& name) {
     AddVertices(name, UniformPoints(kAdded, 3, 3));
     EXPECT_EQ(Refine(name, kSize).state(), v1::Operation::STATE_SUCCEEDED);
@@ -426,7 +426,7 @@ TEST_F(Replayed, AReplayThatIsBrokenOffLeavesNothingEither) {
   EXPECT_TRUE(End(name) == expected);
 }
 
-// One query has the structure built, others wait for it without a worker, and what changes the session is refused.
+// One query has the structure built, others wait for it without a worker, and changes of the session are refused.
 TEST_F(Replayed, OthersWaitForAReplay) {
   const std::string name = Begin();
   const std::string cells = Cells(name);

@@ -28,15 +28,15 @@ class RestoredSessionTest : public ::testing::Test {
         registry_->Create({.tenant = "a", .parameters = {.dimension = 2}, .labels = {}, .ttl = absl::Hours(1)}).value();
   }
 
-  // A process: what the one before had in memory is gone, whatever it was at.
+  // A new process: the memory of the one before is gone, whatever it was at.
   void StartProcess() {
     const std::string name = session_ == nullptr ? "" : session_->name();
     session_ = nullptr;
     registry_.reset();
     log_ = nullptr;
-    log_ = DurableLog::Open({.folder = folder_.path()}).value();
+    log_ = OpenDurableLog({.folder = folder_.path()}).value();
     registry_.emplace(options_, memory_, Clock{.since_boot = [this] { return since_boot_; }}, *log_);
-    const StoredSessions before = log_->Load().value();
+    const StoredSessions before = log_->records().Load().value();
     for (const StoredSession& stored : before.sessions) {
       ASSERT_TRUE(registry_->Restore(stored).ok());
     }
@@ -72,7 +72,7 @@ class RestoredSessionTest : public ::testing::Test {
   TestFolder folder_;
   ServiceOptions options_;
   MemoryBudget memory_{0};
-  std::unique_ptr<DurableLog> log_;
+  std::shared_ptr<SessionLog> log_;
   std::optional<SessionRegistry> registry_;
   std::shared_ptr<Session> session_;
   std::shared_ptr<Operation> resumed_;  // by the last process
@@ -167,8 +167,8 @@ TEST_F(RestoredSessionTest, PointsAreCommittedWhileVerticesAreAdded) {
   });
   ASSERT_TRUE(session_->Append(0, std::vector<double>{0, 0, 1, 0}, 0).ok());
   Refine();
-  const std::vector<double> inside = {session_->mesh()->figures().domain_low[0],
-                                      session_->mesh()->figures().domain_low[1]};
+  const std::vector<double> inside = {session_->mesh()->record().domain_low()[0],
+                                      session_->mesh()->record().domain_low()[1]};
   ASSERT_TRUE(session_->Append(2, inside, 0).ok());
   is_adding = true;
   absl::StatusOr<AddedVertices> added;
@@ -227,13 +227,13 @@ TEST_F(RestoredSessionTest, AClosedSessionIsNotTakenForADamagedOne) {
   EXPECT_EQ(DetailsOf(session_->SetSizes(sizes, 0)).reason, "SESSION_NOT_FOUND") << "its sizes were not read yet";
 }
 
-// A log in which other calls come when a session is gone from the disk, and its deletion has not returned yet.
-class AmidDeletion final : public PassingLog {
+// Records in which other calls come when a session is gone from the disk, and its deletion has not returned yet.
+class AmidDeletion final : public PassingRecords {
  public:
-  using PassingLog::PassingLog;
+  using PassingRecords::PassingRecords;
 
-  absl::Status Commit(const SessionChange& change, Survives survives) override {
-    const absl::Status status = PassingLog::Commit(change, survives);
+  absl::Status Apply(const SessionChange& change, Survives survives) override {
+    const absl::Status status = PassingRecords::Apply(change, survives);
     if (change.is_deletion) {
       others();
     }
@@ -244,14 +244,16 @@ class AmidDeletion final : public PassingLog {
 };
 
 TEST_F(RestoredSessionTest, WhatComesBesideADeletionFindsNoDamage) {
-  AmidDeletion log(*log_);
+  auto amid = std::make_unique<AmidDeletion>(log_);
+  AmidDeletion& records = *amid;
+  SessionLog log(std::move(amid), std::make_unique<PassingFiles>(log_));
   SessionRegistry registry(options_, memory_, Clock(), log);
   const std::shared_ptr<Session> session =
       registry.Create({.tenant = "a", .parameters = {.dimension = 2}, .labels = {}, .ttl = absl::Hours(1)}).value();
   const std::vector<double> points = {0, 0, 1, 0};
   ASSERT_TRUE(session->Append(0, points, 0).ok());
   ASSERT_TRUE(session->CommitPoints().ok());
-  log.others = [&] {
+  records.others = [&] {
     EXPECT_TRUE(session->Append(2, std::vector<double>{0.5, 1}, 0).ok()) << "an upload that goes on";
     EXPECT_TRUE(session->Append(0, points, 0).ok()) << "one that begins again";
     EXPECT_TRUE(session->CheckPrefix({.first = 0, .end = 2, .crc32c = Crc32c(points.data(), 32)}).ok());

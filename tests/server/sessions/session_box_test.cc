@@ -1,4 +1,4 @@
-// What is refused of points and of sizes at points, by the box of their session.
+// Points, and sizes at points, that are refused by the box of their session.
 #include "server/sessions/session_box.h"
 
 #include <limits>

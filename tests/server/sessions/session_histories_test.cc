@@ -1,7 +1,8 @@
-// Random lives of the server's services, sessions and store on a disk that loses power: what clients were answered is
-// there afterwards, and what they were not is there wholly or not at all.
+// Random lives of the server's services, sessions and store on a disk that loses power: answered changes are
+// there afterwards, and each other one is there wholly or not at all.
 #include <array>
 #include <iostream>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,7 +20,7 @@ namespace {
 using Loss = SimulatedDisk::Loss;
 constexpr std::array kLosses = {Loss::kProcess, Loss::kAll, Loss::kSome, Loss::kSome};
 
-// One life with some crashes. What is wrong after one of them; nothing: all is well.
+// One life with some crashes. Returns the fault after one of them; empty: all is well.
 std::string RunHistory(uint64_t seed, const Plant& plant = {}) {
   test::SplitMix64 random(seed);
   SimulatedDisk disk;
@@ -62,10 +63,19 @@ TEST(SessionHistories, NothingThatWasAnsweredIsLost) {
   EXPECT_EQ(CountProblems(seed, histories, {}, problem), 0) << problem;
 }
 
+// Requests that were answered by a process before, which this one does not know of, are decided where their changes are
+// committed.
+TEST(SessionHistories, WhatAnotherProcessHasAnsweredIsNotDoneAgain) {
+  const int histories = test::Amount("WELLSPACE_HISTORIES", 1000) / 2;
+  const uint64_t seed = test::Seed(20261130);
+  std::string problem;
+  EXPECT_EQ(CountProblems(seed, histories, {.hides_answers = true}, problem), 0) << problem;
+}
+
 constexpr std::array kScript = {
     Step::kCreate,
     Step::kUpload,
-    Step::kAddSegments,
+    Step::kAddFeatures,
     Step::kSetSizes,
     Step::kRefine,
     Step::kWork,
@@ -93,21 +103,28 @@ constexpr std::array kScript = {
     Step::kDelete,
 };
 
-// Goes through the script until the disk dies.
-std::string RunScript(SimulatedDisk& disk, SessionLife& life, test::SplitMix64& random) {
+// Of the block: the differences from the script above.
+constexpr std::array kBlockScript = {
+    Step::kCreate, Step::kUpload, Step::kAddFeatures,  Step::kAddFeatures, Step::kRefine, Step::kWork,   Step::kUpload,
+    Step::kRefine, Step::kWork,   Step::kRemovePoints, Step::kRefine,      Step::kWork,   Step::kDelete,
+};
+
+// Goes through `script` with session `number` until the disk dies.
+std::string RunScript(std::span<const Step> script, int number, SimulatedDisk& disk, SessionLife& life,
+                      test::SplitMix64& random) {
   std::string problem = life.Start();
-  for (size_t step = 0; step < kScript.size() && problem.empty() && !disk.is_dead(); ++step) {
+  for (size_t step = 0; step < script.size() && problem.empty() && !disk.is_dead(); ++step) {
     const std::string before = TextOf(life.world());
-    problem = life.Do(kScript[step], 0, random);
-    if (problem.empty() && !disk.is_dead() && kScript[step] != Step::kSweep && TextOf(life.world()) == before) {
+    problem = life.Do(script[step], number, random);
+    if (problem.empty() && !disk.is_dead() && script[step] != Step::kSweep && TextOf(life.world()) == before) {
       problem = absl::StrCat("step ", step, " of the script changes nothing");
     }
   }
   return problem;
 }
 
-// Every operation of one life, whatever else is drawn.
-TEST(SessionHistories, EveryOperationMayBeTheLast) {
+// Lives as `script` says, with each operation of the disk as the last one; how many there are.
+uint64_t EndAtEveryOperation(std::span<const Step> script, int number) {
   uint64_t operation = 0;
   for (bool has_died = true; has_died; ++operation) {
     for (const Loss loss : {Loss::kProcess, Loss::kAll, Loss::kSome}) {
@@ -115,7 +132,7 @@ TEST(SessionHistories, EveryOperationMayBeTheLast) {
       disk.DieAt(operation);
       SessionLife life(disk, {});
       test::SplitMix64 random(17);
-      std::string problem = RunScript(disk, life, random);
+      std::string problem = RunScript(script, number, disk, life, random);
       has_died = disk.is_dead();
       const std::string at = has_died ? disk.failed_operation() : "the end";
       if (problem.empty()) {
@@ -124,13 +141,23 @@ TEST(SessionHistories, EveryOperationMayBeTheLast) {
       if (problem.empty()) {
         problem = life.CheckWhole();
       }
-      ASSERT_EQ(problem, "") << "operation " << operation << ", " << at;
+      EXPECT_EQ(problem, "") << "operation " << operation << ", " << at;
+      if (!problem.empty()) {
+        return operation;
+      }
     }
   }
-  EXPECT_GT(operation, 150u);
+  return operation;
 }
 
-// A history is what its seed says, so that one that goes wrong can be run again.
+// Every operation of one life, whatever else is drawn.
+TEST(SessionHistories, EveryOperationMayBeTheLast) { EXPECT_GT(EndAtEveryOperation(kScript, 0), 150u); }
+
+TEST(SessionHistories, EveryOperationOfABlockMayBeTheLast) {
+  EXPECT_GT(EndAtEveryOperation(kBlockScript, SessionLife::kBlock), 60u);
+}
+
+// A history follows from its seed, so that one that goes wrong can be run again.
 TEST(SessionHistories, AreTheSameEachTime) {
   const auto run = [](uint64_t seed) {
     test::SplitMix64 random(seed);
@@ -194,7 +221,7 @@ INSTANTIATE_TEST_SUITE_P(
                       PlantedFault{"Update", {.during = Step::kUpdate, .answers_before_commit = true}},
                       PlantedFault{"Upload", {.during = Step::kUpload, .answers_before_commit = true}},
                       PlantedFault{"RemovePoints", {.during = Step::kRemovePoints, .answers_before_commit = true}},
-                      PlantedFault{"AddSegments", {.during = Step::kAddSegments, .answers_before_commit = true}},
+                      PlantedFault{"AddFeatures", {.during = Step::kAddFeatures, .answers_before_commit = true}},
                       PlantedFault{"SetSizes", {.during = Step::kSetSizes, .answers_before_commit = true}},
                       PlantedFault{"StartRefinement", {.during = Step::kRefine, .answers_before_commit = true}},
                       PlantedFault{"EndOfRefinement", {.during = Step::kWork, .answers_before_commit = true}},

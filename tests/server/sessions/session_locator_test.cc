@@ -31,7 +31,7 @@ class SessionLocatorTest : public ::testing::Test {
  protected:
   using Located = std::shared_ptr<const LocatedMesh>;
 
-  // What a job gets, and its end.
+  // The locator that a job gets, and the job's end.
   struct Asked {
     absl::StatusOr<Located> located;
     Event done;
@@ -50,7 +50,7 @@ class SessionLocatorTest : public ::testing::Test {
     Asked asked;
     Ask(mesh, asked);
     EXPECT_TRUE(asked.done.Wait());
-    EXPECT_TRUE(pool_.pool.WaitUntilIdle(absl::Minutes(1)));  // it holds what the job gave
+    EXPECT_TRUE(pool_.pool.WaitUntilIdle(absl::Minutes(1)));  // it holds the job's memory
     return std::move(asked.located);
   }
 

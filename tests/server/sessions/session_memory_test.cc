@@ -63,7 +63,7 @@ class SessionMemoryTest : public ::testing::Test {
 };
 
 TEST_F(SessionMemoryTest, ARefinementThatNeedsTooMuchFailsAndLeavesTheSessionAsItWas) {
-  TakeMostOfTheMemory();  // what is left is used up sooner
+  TakeMostOfTheMemory();  // the rest is used up sooner
   const std::string name = calls_.Create().name();
   calls_.Upload(name, 0, UniformPoints(1000, 3, 5));
   ExpectMemoryLimit(Refine(name, 0.004));

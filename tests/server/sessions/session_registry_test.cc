@@ -11,7 +11,7 @@
 #include "absl/strings/escaping.h"
 #include "gtest/gtest.h"
 #include "server/sessions/session_use.h"
-#include "server/store/ephemeral_log.h"
+#include "server/store/session_log.h"
 #include "server/wire/errors.h"
 #include "tests/server/service_harness.h"
 
@@ -41,9 +41,9 @@ class SessionRegistryTest : public ::testing::Test {
   absl::Time now_ = absl::FromUnixSeconds(1'000'000);
   MemoryBudget memory_{0};
   absl::Duration since_boot_ = absl::Hours(1);
-  EphemeralLog log_;
+  const std::unique_ptr<SessionLog> log_ = MakeEphemeralLog();
   SessionRegistry registry_{
-      options_, memory_, {.wall = [this] { return now_; }, .since_boot = [this] { return since_boot_; }}, log_};
+      options_, memory_, {.wall = [this] { return now_; }, .since_boot = [this] { return since_boot_; }}, *log_};
   absl::Status status_;
 };
 

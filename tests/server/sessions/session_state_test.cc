@@ -1,4 +1,4 @@
-// The state of a session: what Apply makes of changes, once they are committed and once they are read again.
+// The state of a session: Apply of changes, once they are committed and once they are read again.
 #include "server/sessions/session_state.h"
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/meshing_version.h"
+#include "core/meshers/meshing_version.h"
 #include "gtest/gtest.h"
 #include "server/sessions/session_changes.h"
 #include "server/wire/errors.h"
@@ -21,7 +21,7 @@
 namespace wellspace::server {
 namespace {
 
-// What a log has of one session, by rules that know nothing of what the records mean.
+// The log of one session, by rules that know nothing of the meaning of records.
 class Log {
  public:
   void Commit(const SessionChange& change) {
@@ -60,7 +60,7 @@ store::v1::MeshRecord MeshOf(uint64_t revision) {
   return mesh;
 }
 
-// A session that does what it is asked for, without stores and mesher: its state, and what its log has.
+// A session that does what it is asked for, without stores and mesher: its state, and its log.
 class Life {
  public:
   Life() {
@@ -75,7 +75,7 @@ class Life {
   const SessionState& state() const { return *state_; }
   const StoredSession& stored() const { return log_.stored(); }
 
-  // Commits and applies. What it was before stays as it was.
+  // Commits and applies. The state before stays unchanged.
   void Make(const SessionChange& change) {
     const std::shared_ptr<const SessionState> before = state_;
     const std::string text = TextOf(*before);
@@ -88,12 +88,24 @@ class Life {
 
   void Upload(uint64_t count) { Make(PointsChange(state(), {.end = state().record.points() + count, .crc32c = 7})); }
   void SetSizes(size_t count) { Make(SizesChange(state(), count == 0 ? nullptr : Samples(count))); }
-  void AddSegments(int count) {
-    v1::AddSegmentsRequest request;
-    for (int i = 0; i < 2 * count; ++i) {
-      request.mutable_segments()->add_ends(i);
+  void AddSegments(uint64_t count) {
+    FeaturePart part;
+    for (uint32_t i = 0; i < 2 * count; ++i) {
+      part.mutable_segments()->add_ends(i);
     }
-    Make(FeaturesChange(state(), request, 0, 0, {.segments = state().record.segments() + count}));
+    Make(FeaturesChange(state(), part, {}, {.counts = Counts() + FeatureCounts{.segments = count}}));
+  }
+  // With a seed and the rule of holes.
+  void AddTriangles(uint64_t count) {
+    FeaturePart part;
+    for (uint32_t i = 0; i < 3 * count; ++i) {
+      part.mutable_triangles()->add_corners(i);
+    }
+    part.mutable_surface()->set_solids(v1::SOLID_RULE_HOLES);
+    part.mutable_surface()->add_seeds()->set_region(4);
+    FeatureSummary after{.counts = Counts() + FeatureCounts{.triangles = count, .seeds = 1}, .has_rules = true};
+    after.surface.emplace().set_solids(v1::SOLID_RULE_HOLES);
+    Make(FeaturesChange(state(), part, {}, after));
   }
   // Appends `count` points with the start, refines with `size`, and ends as `ends` says.
   void Refine(double size, bool restart, uint64_t count, bool succeeds = true) {
@@ -112,17 +124,20 @@ class Life {
                         state().steps.points() + uploaded, count));
   }
   void RemovePoints(uint64_t left) {
-    Make(RemovalChange(state(), {.points = left, .file = NextRevision(state()), .crc32c = 5}));
+    store::v1::PointsFile file;
+    file.set_number(NextRevision(state()));
+    file.set_epoch(3);
+    Make(RemovalChange(state(), {.points = left, .file = file, .crc32c = 5}));
   }
   // One of all these, drawn.
   void DoAnything(test::SplitMix64& random) {
-    switch (random.Below(8)) {
+    switch (random.Below(9)) {
       case 0:
         return Upload(1 + random.Below(9));
       case 1:
         return SetSizes(random.Below(4));
       case 2:
-        return AddSegments(static_cast<int>(1 + random.Below(2)));
+        return AddSegments(1 + random.Below(2));
       case 3:
         return Make(UpdateChange(state(),
                                  std::map<std::string, std::string>{{"drawn", std::to_string(random.Below(100))}},
@@ -131,6 +146,8 @@ class Life {
         return RemovePoints(state().record.points() / 2);
       case 5:
         return Refine(0.5 + random.Unit(), random.Below(3) == 0, random.Below(3), random.Below(4) != 0);
+      case 6:
+        return AddTriangles(1 + random.Below(2));
       default:
         return state().steps.empty() ? Refine(1, false, 1)
                                      : AddVertices(state().record.points() - state().steps.points(), random.Below(3));
@@ -138,6 +155,11 @@ class Life {
   }
 
  private:
+  FeatureCounts Counts() const {
+    const store::v1::SessionRecord& record = state().record;
+    return {.segments = record.segments(), .triangles = record.triangles(), .seeds = record.seeds()};
+  }
+
   std::shared_ptr<const SessionState> state_ = std::make_shared<const SessionState>();
   Log log_;
 };

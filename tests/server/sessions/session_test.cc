@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <new>
 #include <optional>
 #include <string>
 #include <thread>
@@ -14,7 +15,8 @@
 #include "gtest/gtest.h"
 #include "server/jobs/job_pool.h"
 #include "server/sessions/session_registry.h"
-#include "server/store/ephemeral_log.h"
+#include "server/store/memory_files.h"
+#include "server/store/memory_records.h"
 #include "server/wire/convert.h"
 #include "server/wire/errors.h"
 #include "tests/server/service_harness.h"
@@ -30,13 +32,13 @@ class SessionTest : public ::testing::Test {
     return operation.value_or(nullptr);
   }
 
-  // Where the queue of jobs answers with `submitted`.
+  // Starts an operation, where the queue of jobs answers with `submitted`.
   absl::StatusOr<std::shared_ptr<Operation>> TryToStart(const absl::Status& submitted) {
     return session_->StartOperation({.dimension = 2}, /*restart=*/false, 0,
                                     [submitted](const std::shared_ptr<Operation>& /*operation*/) { return submitted; });
   }
 
-  // What a client sees of the session, its time of expiry excepted.
+  // The session as a client sees it, its time of expiry excepted.
   std::string Seen() const {
     v1::Session message = session_->Describe();
     message.clear_expire_time();
@@ -54,8 +56,8 @@ class SessionTest : public ::testing::Test {
   const absl::Status refusal_ = MakeError(v1::ERROR_REASON_QUEUE_FULL, "full");
   ServiceOptions options_;
   MemoryBudget memory_{0};
-  EphemeralLog log_;
-  SessionRegistry registry_{options_, memory_, {}, log_};
+  const std::unique_ptr<SessionLog> log_ = MakeEphemeralLog();
+  SessionRegistry registry_{options_, memory_, {}, *log_};
   std::shared_ptr<Session> session_ =
       registry_.Create({.tenant = "a", .parameters = {.dimension = 2}, .labels = {}, .ttl = {}}).value();
 };
@@ -164,11 +166,19 @@ TEST_F(SessionTest, AnOperationThatHasEndedTakesNoJob) {
   EXPECT_FALSE(session_->BeginWork(*operation).has_value());
 }
 
-// A log that has no room while `is_full`.
-class LogOnAFullDisk final : public EphemeralLog {
+// A log in memory, with records or files of the test's.
+template <typename R = MemoryRecords, typename F = MemoryFiles>
+struct TestLog {
+  R* const records = new R;
+  F* const files = new F;
+  SessionLog log{std::unique_ptr<Records>(records), std::unique_ptr<Files>(files)};
+};
+
+// Records that have no room while `is_full`.
+class RecordsOnAFullDisk : public MemoryRecords {
  public:
   bool is_durable() const override { return true; }
-  absl::Status Commit(const SessionChange& /*change*/, Survives /*survives*/) override {
+  absl::Status Apply(const SessionChange& /*change*/, Survives /*survives*/) override {
     return is_full ? MakeError(v1::ERROR_REASON_DISK_FULL, "full") : absl::OkStatus();
   }
 
@@ -178,11 +188,11 @@ class LogOnAFullDisk final : public EphemeralLog {
 TEST(SessionOnAFullDisk, AWorkerThatIsFasterThanARefusedStartDoesNotBegin) {
   const ServiceOptions options;
   MemoryBudget memory(uint64_t{1} << 30);
-  LogOnAFullDisk log;
-  SessionRegistry registry(options, memory, {}, log);
+  TestLog<RecordsOnAFullDisk> log;
+  SessionRegistry registry(options, memory, {}, log.log);
   const std::shared_ptr<Session> session =
       registry.Create({.tenant = "a", .parameters = {.dimension = 2}, .labels = {}, .ttl = {}}).value();
-  log.is_full = true;
+  log.records->is_full = true;
   std::thread worker;
   bool has_begun = true;
   const auto submit = [&](const std::shared_ptr<Operation>& operation) {
@@ -193,27 +203,27 @@ TEST(SessionOnAFullDisk, AWorkerThatIsFasterThanARefusedStartDoesNotBegin) {
   worker.join();
   EXPECT_EQ(DetailsOf(operation.status()).reason, "DISK_FULL");
   EXPECT_FALSE(has_begun);
-  log.is_full = false;
+  log.records->is_full = false;
   EXPECT_TRUE(session->StartOperation({.dimension = 2}, false, 0, [](const auto&) { return absl::OkStatus(); }).ok());
 }
 
 TEST(SessionOnAFullDisk, ChangesAreRefusedAndNoneIsMade) {
   const ServiceOptions options;
   MemoryBudget memory(uint64_t{1} << 30);
-  LogOnAFullDisk log;
-  SessionRegistry registry(options, memory, {}, log);
+  TestLog<RecordsOnAFullDisk> log;
+  SessionRegistry registry(options, memory, {}, log.log);
   const std::shared_ptr<Session> session =
       registry.Create({.tenant = "a", .parameters = {.dimension = 2}, .labels = {}, .ttl = {}}).value();
   const auto sizes = std::make_shared<const core::SizeSamples>(core::SizeSamples{.points = {0, 0}, .sizes = {1}});
   ASSERT_TRUE(session->SetSizes(sizes, 0).ok());
-  log.is_full = true;
+  log.records->is_full = true;
   memory.NoteIdle();  // as far as it knows, a session may give up memory: that is no help with a disk
   v1::Session before = session->Describe();
   EXPECT_EQ(DetailsOf(session->SetSizes(nullptr, 0)).reason, "DISK_FULL");
-  v1::AddSegmentsRequest request;
-  request.mutable_segments()->add_ends(0);
-  request.mutable_segments()->add_ends(1);
-  EXPECT_EQ(DetailsOf(session->AddSegments(request, 0)).reason, "DISK_FULL");
+  FeaturePart part;
+  part.mutable_segments()->add_ends(0);
+  part.mutable_segments()->add_ends(1);
+  EXPECT_EQ(DetailsOf(session->AddFeatures(part, {}, 0)).reason, "DISK_FULL");
   ASSERT_TRUE(session->Append(0, std::vector<double>{0.5, 0.5}, 0).ok());
   EXPECT_EQ(DetailsOf(session->CommitPoints()).reason, "DISK_FULL");
   EXPECT_TRUE(memory.CanMakeRoom()) << "nothing was given up for it";
@@ -221,21 +231,54 @@ TEST(SessionOnAFullDisk, ChangesAreRefusedAndNoneIsMade) {
   before.clear_expire_time();
   after.clear_expire_time();
   EXPECT_EQ(after.DebugString(), before.DebugString());
-  log.is_full = false;
+  log.records->is_full = false;
   EXPECT_TRUE(session->SetSizes(nullptr, 0).ok());
   EXPECT_EQ(session->Describe().size_count(), 0u);
 }
 
-// A log that tells when points are about to be copied to a file of their own.
-class LogThatTellsOfRemovals final : public EphemeralLog {
+// Records whose changes find no memory while `is_out_of_memory`.
+class RecordsWithoutMemory final : public MemoryRecords {
  public:
   bool is_durable() const override { return true; }
-  std::unique_ptr<PointStore> OpenPoints(const std::string& session, int dimension, uint64_t number,
-                                         std::vector<store::v1::StepRecord::Points> committed) override {
-    if (number > 0) {
+  absl::Status Apply(const SessionChange& /*change*/, Survives /*survives*/) override {
+    if (is_out_of_memory) {
+      throw std::bad_alloc();
+    }
+    return absl::OkStatus();
+  }
+
+  bool is_out_of_memory = false;
+};
+
+TEST(SessionOutOfMemory, AStartAndAnUploadAreRefusedAndMayBeTriedAgain) {
+  const ServiceOptions options;
+  MemoryBudget memory(uint64_t{1} << 30);
+  TestLog<RecordsWithoutMemory> log;
+  SessionRegistry registry(options, memory, {}, log.log);
+  const std::shared_ptr<Session> session =
+      registry.Create({.tenant = "a", .parameters = {.dimension = 2}, .labels = {}, .ttl = {}}).value();
+  ASSERT_TRUE(session->Append(0, std::vector<double>{0.5, 0.5}, 0).ok());
+  log.records->is_out_of_memory = true;
+  EXPECT_EQ(DetailsOf(session->CommitPoints()).reason, "OUT_OF_MEMORY");
+  EXPECT_EQ(session->UncommittedBytes(), 0u) << "no point is left without its checksum";
+  const auto submit = [](const auto&) { return absl::OkStatus(); };
+  const auto refused = session->StartOperation({.dimension = 2}, /*restart=*/false, 0, submit);
+  EXPECT_EQ(DetailsOf(refused.status()).reason, "OUT_OF_MEMORY");
+  EXPECT_NE(session->Describe().state(), v1::Session::STATE_REFINING);
+  log.records->is_out_of_memory = false;
+  ASSERT_TRUE(session->Append(0, std::vector<double>{0.5, 0.5}, 0).ok());
+  EXPECT_TRUE(session->CommitPoints().ok());
+  EXPECT_TRUE(session->StartOperation({.dimension = 2}, false, 0, submit).ok());
+}
+
+// Files that tell when points are about to be copied to a file of their own.
+class FilesThatTellOfRemovals final : public MemoryFiles {
+ public:
+  std::unique_ptr<PointStore> OpenPoints(SessionPoints points) override {
+    if (points.next.number() > 1) {
       on_removal();
     }
-    return EphemeralLog::OpenPoints(session, dimension, number, std::move(committed));
+    return MemoryFiles::OpenPoints(std::move(points));
   }
 
   std::function<void()> on_removal;
@@ -244,8 +287,8 @@ class LogThatTellsOfRemovals final : public EphemeralLog {
 TEST(SessionRemoval, WhatIsAppendedIsCommittedWithTheRemoval) {
   const ServiceOptions options;
   MemoryBudget memory(uint64_t{1} << 30);
-  LogThatTellsOfRemovals log;
-  SessionRegistry registry(options, memory, {}, log);
+  TestLog<RecordsOnAFullDisk, FilesThatTellOfRemovals> log;
+  SessionRegistry registry(options, memory, {}, log.log);
   const std::shared_ptr<Session> session =
       registry.Create({.tenant = "a", .parameters = {.dimension = 2}, .labels = {}, .ttl = {}}).value();
   ASSERT_TRUE(session->Append(0, std::vector<double>{0, 0, 1, 0, 0, 1}, 0).ok());
@@ -253,7 +296,7 @@ TEST(SessionRemoval, WhatIsAppendedIsCommittedWithTheRemoval) {
   ASSERT_TRUE(session->Append(3, std::vector<double>{1, 1}, 0).ok());
   const uint64_t revision = session->Describe().revision();
   bool is_told = false;
-  log.on_removal = [&] {
+  log.files->on_removal = [&] {
     is_told = true;
     EXPECT_TRUE(session->CommitPoints().ok()) << "an upload that ends now";
     EXPECT_EQ(session->state()->record.points(), 3u) << "points that are being copied stay what they are";
@@ -271,8 +314,8 @@ TEST(SessionRemoval, WhatIsAppendedIsCommittedWithTheRemoval) {
 TEST(SessionOnAFullDisk, OperationsOfAnEarlierProcessAreTakenUp) {
   const ServiceOptions options;
   MemoryBudget memory(uint64_t{1} << 30);
-  LogOnAFullDisk log;
-  log.is_full = true;
+  TestLog<RecordsOnAFullDisk> log;
+  log.records->is_full = true;
   StoredSession stored;
   stored.state.set_name("sessions/1");
   stored.state.set_revision(1);
@@ -289,7 +332,7 @@ TEST(SessionOnAFullDisk, OperationsOfAnEarlierProcessAreTakenUp) {
     return resumed.value_or(nullptr);
   };
   const auto restore = [&] {
-    return Session::Restore(stored, options, memory, {}, std::make_shared<TenantPoints>(), log).value();
+    return Session::Restore(stored, options, memory, {}, std::make_shared<TenantPoints>(), log.log).value();
   };
   const std::shared_ptr<Session> session = restore();
   const std::shared_ptr<Operation> resumed = resume(session);

@@ -1,3 +1,4 @@
+// A copy of a folder is of one moment, and a server starts on it.
 #include "server/store/back_up.h"
 
 #include <atomic>
@@ -47,7 +48,7 @@ class NoLinks final : public FileSystem {
 };
 
 // One more piece of points, and another mesh in the place of the last.
-absl::Status Change(DurableLog& log, uint64_t number, uint64_t revision, PointStore& points,
+absl::Status Change(SessionLog& log, uint64_t number, uint64_t revision, PointStore& points,
                     std::shared_ptr<MeshSnapshot>& mesh) {
   const std::vector<double> piece = {1, 2, static_cast<double>(revision)};
   SessionChange change{.session = SessionName(number), .state = MakeState(number, revision)};
@@ -57,15 +58,15 @@ absl::Status Change(DurableLog& log, uint64_t number, uint64_t revision, PointSt
   if (absl::Status status = points.Synchronize(); !status.ok()) {
     return status;
   }
-  auto kept =
-      log.KeepMesh(change.session, revision, MakeMesh({.salt = static_cast<uint32_t>(revision)}), core::RunContext());
+  auto kept = log.files().KeepMesh(change.session, revision, /*epoch=*/0,
+                                   MakeMesh({.salt = static_cast<uint32_t>(revision)}), core::RunContext());
   if (!kept.ok()) {
     return kept.status();
   }
   change.steps = {MakePointsStep(revision - 1, piece, 3)};
   change.state->set_points(revision);
-  *change.state->mutable_mesh() = *(*kept)->record();
-  if (absl::Status status = log.Commit(change); !status.ok()) {
+  *change.state->mutable_mesh() = (*kept)->record();
+  if (absl::Status status = CommitTo(log, change); !status.ok()) {
     return status;
   }
   if (mesh != nullptr) {
@@ -83,10 +84,10 @@ class BackUpTest : public ::testing::Test {
 };
 
 TEST_F(BackUpTest, AServerStartsOnTheCopy) {
-  const auto log = *DurableLog::Open({.folder = from_});
+  const auto log = *OpenDurableLog({.folder = from_});
   for (uint64_t number = 1; number <= 3; ++number) {
-    ASSERT_TRUE(log->Commit({.session = SessionName(number), .state = MakeState(number)}).ok());
-    const auto points = log->OpenPoints(SessionName(number), 3, 0, {});
+    ASSERT_TRUE(CommitTo(*log, {.session = SessionName(number), .state = MakeState(number)}).ok());
+    const auto points = log->files().OpenPoints({.session = SessionName(number), .dimension = 3});
     std::shared_ptr<MeshSnapshot> mesh;
     for (uint64_t revision = 1; revision <= number; ++revision) {
       ASSERT_TRUE(Change(*log, number, revision, *points, mesh).ok());
@@ -101,30 +102,30 @@ TEST_F(BackUpTest, AServerStartsOnTheCopy) {
     EXPECT_EQ(report->sessions, 3u);
     EXPECT_EQ(report->points, 6u);
     EXPECT_EQ(report->meshes, 3u);
-    const auto restored = DurableLog::Open({.folder = to});
+    const auto restored = OpenDurableLog({.folder = to});
     ASSERT_TRUE(restored.ok()) << restored.status();
-    EXPECT_EQ(TextOf(*(*restored)->Load()), TextOf(*log->Load()));
+    EXPECT_EQ(TextOf(*(*restored)->records().Load()), TextOf(*log->records().Load()));
     EXPECT_THAT((*restored)->RemoveGarbage()->set_aside, IsEmpty());
     EXPECT_EQ(std::filesystem::file_size(to + "/files/00000003.points"), 72u) << "the committed ones alone";
   }
 }
 
 TEST_F(BackUpTest, IsOfOneMomentWhateverAServerDoesMeanwhile) {
-  const auto log = *DurableLog::Open({.folder = from_});
+  const auto log = *OpenDurableLog({.folder = from_});
   std::atomic<bool> is_over = false;
   std::atomic<int> failed = 0;
   std::vector<std::thread> writers;
   for (uint64_t writer = 1; writer <= 2; ++writer) {
     writers.emplace_back([&, writer] {
       for (uint64_t number = writer; !is_over; number += 2) {
-        failed += log->Commit({.session = SessionName(number), .state = MakeState(number)}).ok() ? 0 : 1;
-        const auto points = log->OpenPoints(SessionName(number), 3, 0, {});
+        failed += CommitTo(*log, {.session = SessionName(number), .state = MakeState(number)}).ok() ? 0 : 1;
+        const auto points = log->files().OpenPoints({.session = SessionName(number), .dimension = 3});
         std::shared_ptr<MeshSnapshot> mesh;
         for (uint64_t revision = 1; revision < 10; ++revision) {
           failed += Change(*log, number, revision, *points, mesh).ok() ? 0 : 1;
         }
         if (number % 3 != 0) {
-          failed += log->Commit({.session = SessionName(number), .is_deletion = true}).ok() ? 0 : 1;
+          failed += CommitTo(*log, {.session = SessionName(number), .is_deletion = true}).ok() ? 0 : 1;
         }
       }
     });
@@ -143,12 +144,12 @@ TEST_F(BackUpTest, IsOfOneMomentWhateverAServerDoesMeanwhile) {
   EXPECT_EQ(failed, 0);
 }
 
-// What the copy of the rows names has to stay until it is copied, too.
+// Files that the copied rows name have to stay until they are copied, too.
 TEST_F(BackUpTest, AServerRemovesNothingMeanwhile) {
-  const auto log = *DurableLog::Open({.folder = from_});
+  const auto log = *OpenDurableLog({.folder = from_});
   std::shared_ptr<MeshSnapshot> mesh;
-  ASSERT_TRUE(log->Commit({.session = SessionName(1), .state = MakeState(1)}).ok());
-  auto points = log->OpenPoints(SessionName(1), 3, 0, {});
+  ASSERT_TRUE(CommitTo(*log, {.session = SessionName(1), .state = MakeState(1)}).ok());
+  auto points = log->files().OpenPoints({.session = SessionName(1), .dimension = 3});
   ASSERT_TRUE(Change(*log, 1, 1, *points, mesh).ok());
   for (const bool has_name : {true, false}) {
     // As a back-up holds them; the name of the one is gone in the second round.
@@ -163,7 +164,7 @@ TEST_F(BackUpTest, AServerRemovesNothingMeanwhile) {
     EXPECT_THAT(std::string(second.message()), HasSubstr("is backing this folder up"));
     if (has_name) {
       ASSERT_TRUE(Change(*log, 1, 2, *points, mesh).ok());
-      ASSERT_TRUE(log->Commit({.session = SessionName(1), .is_deletion = true}).ok());
+      ASSERT_TRUE(CommitTo(*log, {.session = SessionName(1), .is_deletion = true}).ok());
       mesh.reset();
       points.reset();
     }
@@ -179,7 +180,7 @@ TEST_F(BackUpTest, AServerRemovesNothingMeanwhile) {
 }
 
 TEST_F(BackUpTest, WantsAFolderOfItsOwn) {
-  const auto log = *DurableLog::Open({.folder = from_});
+  const auto log = *OpenDurableLog({.folder = from_});
   const absl::Status self = BackUp(from_, from_).status();
   EXPECT_EQ(self.code(), absl::StatusCode::kFailedPrecondition);
   std::filesystem::create_directory_symlink(from_, folder_.path() + "/link");
@@ -198,9 +199,9 @@ TEST_F(BackUpTest, WantsAFolderOfItsOwn) {
 }
 
 TEST_F(BackUpTest, SaysThatTheFolderIsNotWhole) {
-  const auto log = *DurableLog::Open({.folder = from_});
-  ASSERT_TRUE(log->Commit({.session = SessionName(1), .state = MakeState(1)}).ok());
-  const auto points = log->OpenPoints(SessionName(1), 3, 0, {});
+  const auto log = *OpenDurableLog({.folder = from_});
+  ASSERT_TRUE(CommitTo(*log, {.session = SessionName(1), .state = MakeState(1)}).ok());
+  const auto points = log->files().OpenPoints({.session = SessionName(1), .dimension = 3});
   std::shared_ptr<MeshSnapshot> mesh;
   ASSERT_TRUE(Change(*log, 1, 1, *points, mesh).ok());
   FlipBit(from_ + "/files/00000001.points", 3, 3);

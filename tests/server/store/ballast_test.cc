@@ -1,3 +1,4 @@
+// The ballast takes room, gives it up, and is never half there.
 #include "server/store/ballast.h"
 
 #include <string>

@@ -1,3 +1,4 @@
+// What check-data counts, and the damage that it names.
 #include "server/store/check_data.h"
 
 #include <filesystem>
@@ -21,18 +22,18 @@ using ::testing::IsEmpty;
 class CheckDataTest : public ::testing::Test {
  protected:
   CheckDataTest() {
-    log_ = *DurableLog::Open({.folder = folder_.path()});
+    log_ = *OpenDurableLog({.folder = folder_.path()});
     for (uint64_t number = 1; number <= 3; ++number) {
       AddSession(*log_, number);
     }
   }
 
   // Two pieces of points, a domain, an operation, a mesh and an answer.
-  static void AddSession(DurableLog& log, uint64_t number) {
+  static void AddSession(SessionLog& log, uint64_t number) {
     const std::vector<double> points = {1, 2, 3, 4, 5, static_cast<double>(number)};
     SessionChange change{.session = SessionName(number), .state = MakeState(number, 1)};
-    ASSERT_TRUE(log.Commit(change).ok());
-    const auto store = log.OpenPoints(change.session, 3, 0, {});
+    ASSERT_TRUE(CommitTo(log, change).ok());
+    const auto store = log.files().OpenPoints({.session = change.session, .dimension = 3});
     ASSERT_TRUE(store->Append(points).ok());
     ASSERT_TRUE(store->Append(points).ok());
     ASSERT_TRUE(store->Synchronize().ok());
@@ -46,22 +47,23 @@ class CheckDataTest : public ::testing::Test {
     change.sizes->parts.emplace_back().mutable_samples()->add_sizes(0.5);
     change.operations.emplace_back().set_number(1);
     change.answer = MakeAnswer("tenant", change.session, "done");
-    const auto mesh = log.KeepMesh(change.session, 2, MakeMesh({.vertices = 30}), core::RunContext());
+    const auto mesh =
+        log.files().KeepMesh(change.session, 2, /*epoch=*/0, MakeMesh({.vertices = 30}), core::RunContext());
     ASSERT_TRUE(mesh.ok()) << mesh.status();
     change.state->set_points(4);
     change.state->set_segments(1);
     change.state->set_seeds(1);
     change.state->set_sizes(2);
     change.state->set_size_count(1);
-    *change.state->mutable_mesh() = *(*mesh)->record();
-    ASSERT_TRUE(log.Commit(change).ok());
+    *change.state->mutable_mesh() = (*mesh)->record();
+    ASSERT_TRUE(CommitTo(log, change).ok());
   }
 
   // Session 2 as it is after `change`.
   void Commit(const std::function<void(store::v1::SessionRecord& state)>& change) {
-    store::v1::SessionRecord state = log_->Load()->sessions.at(1).state;
+    store::v1::SessionRecord state = log_->records().Load()->sessions.at(1).state;
     change(state);
-    ASSERT_TRUE(log_->Commit({.session = SessionName(2), .state = state}).ok());
+    ASSERT_TRUE(CommitTo(*log_, {.session = SessionName(2), .state = state}).ok());
   }
 
   std::vector<std::string> Problems() {
@@ -72,7 +74,7 @@ class CheckDataTest : public ::testing::Test {
 
   const TestFolder folder_;
   const std::string files_ = folder_.path() + "/files/";
-  std::unique_ptr<DurableLog> log_;
+  std::unique_ptr<SessionLog> log_;
 };
 
 TEST_F(CheckDataTest, CountsWhatIsThere) {
@@ -115,7 +117,8 @@ TEST_F(CheckDataTest, NamesRecordsThatDoNotFitTogether) {
     state.set_points(4);
     state.set_seeds(2);
   });
-  EXPECT_THAT(Problems(), ElementsAre(session + "there are 1 segments and 2 seeds, and 1 and 1 in its steps"));
+  EXPECT_THAT(Problems(),
+              ElementsAre(session + "there are 1 segments, 0 triangles and 2 seeds, and 1, 0 and 1 in its steps"));
   Commit([](store::v1::SessionRecord& state) {
     state.set_seeds(1);
     state.set_next_operation(1);
@@ -136,7 +139,7 @@ TEST_F(CheckDataTest, NamesRecordsThatDoNotFitTogether) {
 TEST_F(CheckDataTest, NamesDamageOfTheDatabase) {
   log_.reset();
   const std::string path = folder_.path() + "/sessions.db";
-  FlipBit(path, std::filesystem::file_size(path) - 60, 1);  // within a record
+  FlipBit(path, BytesOfFile(path).find("tenant 1"), 1);  // within a record
   const auto report = CheckData(folder_.path());
   if (report.ok()) {
     EXPECT_THAT(report->problems, Contains(HasSubstr("sessions.db: ")));

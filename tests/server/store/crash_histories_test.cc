@@ -1,4 +1,4 @@
-// Random lives of a log on a disk that loses power: what was acknowledged is there afterwards, and what was not is
+// Random lives of a log on a disk that loses power: acknowledged changes are there afterwards, and each other change is
 // there wholly or not at all.
 #include <algorithm>
 #include <array>
@@ -29,7 +29,7 @@ struct Bugs {
   std::vector<std::string> unsynchronised{};  // ends of paths
 };
 
-// One life with some crashes. What is wrong after one of them; nothing: all is well.
+// One life with some crashes. Returns the fault after one of them; empty: all is well.
 std::string RunHistory(SimulatedDisk& disk, uint64_t seed, const Bugs& bugs = {}) {
   test::SplitMix64 random(seed);
   disk.Clear();
@@ -108,7 +108,7 @@ TEST(CrashHistories, EveryOperationMayBeTheLast) {
   EXPECT_GT(operation, 150u);
 }
 
-// Backs a life up and loses power then. What is wrong with the copy; nothing: it is whole, and has all.
+// Backs a life up and loses power then. Returns the fault of the copy; empty: it is whole, and has all.
 std::string LosePowerAfterBackUp(const std::string& unsynchronised, uint64_t seed) {
   SimulatedDisk disk;
   {

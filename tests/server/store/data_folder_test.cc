@@ -1,3 +1,4 @@
+// The folder of a server: its rights, its lock, its names and its garbage.
 #include "server/store/data_folder.h"
 
 #include <unistd.h>
@@ -51,20 +52,75 @@ TEST_F(DataFolderTest, IsNoFile) {
   EXPECT_THAT(std::string(status.message()), HasSubstr("/file: cannot be used: Not a directory"));
 }
 
-TEST_F(DataFolderTest, FilesHaveTheirSessionsNames) {
-  EXPECT_EQ(paths_.points("sessions/01ef", 0), root_ + "/files/01ef.points");
-  EXPECT_EQ(paths_.mesh("sessions/01ef", 12), root_ + "/files/01ef.mesh-12");
-  EXPECT_EQ(paths_.points("sessions/../x", 0), root_ + "/files/x73657373696f6e732f2e2e2f78.points");
-  EXPECT_EQ(paths_.points("sessions/01ef", 12), root_ + "/files/01ef.points-12");
+store::v1::PointsFile FileOf(uint64_t number, uint64_t epoch) {
+  store::v1::PointsFile file;
+  file.set_number(number);
+  file.set_epoch(epoch);
+  return file;
+}
+
+TEST_F(DataFolderTest, FilesHaveTheirSessionsNamesAndTheEpochsOfTheirOwners) {
+  EXPECT_EQ(paths_.points("sessions/01ef", FileOf(0, 0)), root_ + "/files/01ef.points");
+  EXPECT_EQ(paths_.mesh("sessions/01ef", 12, 0), root_ + "/files/01ef.mesh-12");
+  EXPECT_EQ(paths_.points("sessions/../x", FileOf(0, 0)), root_ + "/files/x73657373696f6e732f2e2e2f78.points");
+  EXPECT_EQ(paths_.points("sessions/01ef", FileOf(12, 0)), root_ + "/files/01ef.points-12");
+  EXPECT_EQ(paths_.points("sessions/01ef", FileOf(12, 3)), root_ + "/files/01ef.points-12-3");
+  EXPECT_EQ(paths_.mesh("sessions/01ef", 12, 3), root_ + "/files/01ef.mesh-12-3");
   for (const char* name : {"01ef.points", "x73.points", "01ef.points-12", "01ef.mesh-12", "01ef.mesh-12.tmp"}) {
-    EXPECT_TRUE(IsNameOfOurs(name)) << name;
+    EXPECT_EQ(EpochOfName(name), 0) << name;
   }
-  for (const char* name : {"", "01ef", ".points", "x.points", "01eF.points", "01ef.points.tmp", "01ef.points-",
-                           "01ef.points-x", "01ef.points12", "01ef.mesh-", "notes.txt", "01ef.mesh-1x",
-                           "01ef.mesh-.tmp", "01ef.mesh-1.tmp.tmp", "g.points"}) {
-    EXPECT_FALSE(IsNameOfOurs(name)) << name;
+  for (const char* name : {"01ef.points-12-3", "01ef.mesh-12-3", "01ef.mesh-12-3.tmp"}) {
+    EXPECT_EQ(EpochOfName(name), 3) << name;
+  }
+  for (const char* name : {"",
+                           "01ef",
+                           ".points",
+                           "x.points",
+                           "01eF.points",
+                           "01ef.points.tmp",
+                           "01ef.points-",
+                           "01ef.points-x",
+                           "01ef.points12",
+                           "01ef.mesh-",
+                           "notes.txt",
+                           "01ef.mesh-1x",
+                           "01ef.mesh",
+                           "01ef.mesh-.tmp",
+                           "01ef.mesh-1.tmp.tmp",
+                           "g.points",
+                           "01ef.mesh-1-",
+                           "01ef.mesh-1-2-3",
+                           "01ef.points--3",
+                           "01ef.mesh-1-99999999999999999999"}) {
+    EXPECT_EQ(EpochOfName(name), std::nullopt) << name;
   }
 }
+
+// Of two owners of one folder neither takes files that the other may still have named.
+TEST_F(DataFolderTest, LeavesWhatOtherOwnersMayStillHaveNamed) {
+  const auto folder = DataFolder::Open(root_, PosixFileSystem());
+  ASSERT_TRUE(folder.ok());
+  const auto in_use = std::make_shared<FilesInUse>(PosixFileSystem());
+  for (const char* name : {"aa.points-1-3", "aa.mesh-2-4", "aa.mesh-3-4.tmp", "bb.points-1-5", "bb.mesh-2-6.tmp"}) {
+    WriteFile(paths_.files() + "/" + name, "x");
+  }
+  const auto use = in_use->Take(paths_.files() + "/bb.points-1-5", /*is_written=*/true);
+  const auto sweep = [&](uint64_t own, uint64_t oldest) {
+    EXPECT_TRUE((*folder)
+                    ->RemoveGarbage(
+                        *in_use, [&](uint64_t epoch) { return epoch == own; },
+                        [&] { return Census{.sessions = {}, .oldest_epoch = oldest}; }, now_)
+                    .ok());
+    return PosixFileSystem().List(paths_.files()).value();
+  };
+  EXPECT_THAT(sweep(5, 4), UnorderedElementsAre("aa.mesh-2-4", "aa.mesh-3-4.tmp", "bb.points-1-5", "bb.mesh-2-6.tmp"))
+      << "the owner at 3 is no more; that at 4 lives, and makes a mesh";
+  EXPECT_THAT(sweep(4, 4), UnorderedElementsAre("bb.points-1-5", "bb.mesh-2-6.tmp"));
+  EXPECT_THAT(sweep(6, 6), UnorderedElementsAre("bb.points-1-5")) << "this process has it";
+}
+
+// Epochs of a process that has none.
+bool OwnsNone(uint64_t /*epoch*/) { return false; }
 
 TEST_F(DataFolderTest, SetsAsideWhatNoSessionNamesAndLeavesWhatItDoesNotKnow) {
   const auto folder = DataFolder::Open(root_, PosixFileSystem());
@@ -72,6 +128,7 @@ TEST_F(DataFolderTest, SetsAsideWhatNoSessionNamesAndLeavesWhatItDoesNotKnow) {
   const auto in_use = std::make_shared<FilesInUse>(PosixFileSystem());
   store::v1::SessionRecord session = MakeState(1);
   session.set_name("sessions/aa");
+  session.set_points(1);
   session.mutable_mesh()->set_revision(3);
   for (const char* name : {"aa.points", "aa.mesh-2", "aa.mesh-3", "aa.mesh-3.tmp", "bb.points", "bb.mesh-1",
                            "cc.mesh-1", "cc.mesh-1.tmp", "notes.txt"}) {
@@ -84,7 +141,7 @@ TEST_F(DataFolderTest, SetsAsideWhatNoSessionNamesAndLeavesWhatItDoesNotKnow) {
   const auto use = in_use->Take(paths_.files() + "/cc.mesh-1", /*is_written=*/true);
   const auto written = in_use->Take(paths_.files() + "/cc.mesh-1.tmp", /*is_written=*/true);
   const auto sweep = (*folder)->RemoveGarbage(
-      *in_use, [&] { return std::vector{session}; }, now_);
+      *in_use, OwnsNone, [&] { return Census{.sessions = {session}, .oldest_epoch = 1}; }, now_);
   ASSERT_TRUE(sweep.ok()) << sweep.status();
   std::vector<std::string> set_aside;
   for (const Garbage::SetAside& file : sweep->set_aside) {
@@ -110,10 +167,10 @@ TEST_F(DataFolderTest, LeavesAFileAloneThatIsWrittenMeanwhile) {
     const std::string path = paths_.files() + name;
     WriteFile(path, "of a process that died");
     const auto sweep = (*folder)->RemoveGarbage(
-        *in_use,
+        *in_use, OwnsNone,
         [&] {
           in_use->Take(path, /*is_written=*/true).reset();
-          return std::vector<store::v1::SessionRecord>();
+          return Census{.sessions = {}, .oldest_epoch = 1};
         },
         now_);
     ASSERT_TRUE(sweep.ok()) << sweep.status();
@@ -137,7 +194,7 @@ TEST_F(DataFolderTest, RemovesNothingWhereTheRowsCannotBeRead) {
   WriteFile(paths_.files() + "/aa.points", "x");
   EXPECT_FALSE((*folder)
                    ->RemoveGarbage(
-                       *in_use, [] { return absl::DataLossError("damaged"); }, now_)
+                       *in_use, OwnsNone, [] { return absl::DataLossError("damaged"); }, now_)
                    .ok());
   EXPECT_TRUE(std::filesystem::exists(paths_.files() + "/aa.points"));
 }

@@ -1,3 +1,4 @@
+// Chunks add up to their mesh, and CRC32C is that of RFC 3720.
 #include "server/store/mesh_chunks.h"
 
 #include <algorithm>
@@ -126,7 +127,7 @@ INSTANTIATE_TEST_SUITE_P(Sizes, MeshChunksOf,
                          ::testing::Combine(::testing::Values(2, 3), ::testing::Values(0, 1, 2, 3, 100, 1000),
                                             ::testing::Values(128, 200, 1000, kMaxResponseBytes), ::testing::Bool()));
 
-// Who asks for the boundary gets its arrays, too; who does not, the bytes that there always were.
+// A client that asks for the boundary gets its arrays, too; any other gets the bytes that there always were.
 TEST(MeshChunks, BringTheBoundaryToThoseThatAskForIt) {
   core::Mesh mesh = MakeFakeMesh(core::MeshParameters(), std::vector<double>(300, 0.5));
   core::Mesh plain = mesh;

@@ -1,3 +1,4 @@
+// Meshes in files against meshes in memory; a flipped bit anywhere is found.
 #include "server/store/mesh_file.h"
 
 #include <algorithm>
@@ -50,7 +51,7 @@ TEST_P(MeshFileOf, IsToDownloadsWhatMemoryIs) {
                                     .has_moved = has_moved,
                                     .has_regions = has_regions});
   const auto kept = Keep(mesh);
-  const auto found = Find(*kept->record());
+  const auto found = Find(kept->record());
   const MemoryMesh memory(5, mesh);
   for (const bool with_boundary : {false, true}) {
     const auto expected = DownloadOf(memory, with_boundary);
@@ -61,9 +62,9 @@ TEST_P(MeshFileOf, IsToDownloadsWhatMemoryIs) {
       EXPECT_TRUE(*download == *expected) << with_boundary;
     }
   }
-  EXPECT_EQ(found->figures().vertices, mesh.vertex_count());
-  EXPECT_EQ(found->figures().simplices, mesh.simplex_count());
-  EXPECT_EQ(found->figures().domain_high, mesh.domain_high);
+  EXPECT_EQ(found->record().vertices(), mesh.vertex_count());
+  EXPECT_EQ(found->record().simplices(), mesh.simplex_count());
+  EXPECT_THAT(found->record().domain_high(), ::testing::ElementsAreArray(mesh.domain_high));
   EXPECT_EQ(found->revision(), 5u);
   EXPECT_TRUE(found->Check().ok());
   EXPECT_LT(found->memory_bytes(), 8192u) << "a mesh in a file takes no memory";
@@ -136,19 +137,19 @@ TEST_F(MeshFileTest, KnowsTheSameMesh) {
   expect_other("regions", [](core::Mesh& mesh) { mesh.simplex_regions[0] ^= 1; });
 }
 
-// Of every byte of the file: nothing that it holds is read when it is another than what was written.
+// Of every byte of the file: its contents are not read when it is another than was written.
 TEST_F(MeshFileTest, AFlippedBitAnywhereIsFoundAndNamed) {
   const auto kept = Keep(MakeMesh({.vertices = 12, .simplices = 9, .has_weights = true, .has_moved = true}), 128);
   const uint64_t size = std::filesystem::file_size(path_);
-  EXPECT_EQ(size, kept->record()->size());
+  EXPECT_EQ(size, kept->record().size());
   for (uint64_t byte = 0; byte < size; ++byte) {
     FlipBit(path_, byte, static_cast<int>(byte % 8));
-    const absl::Status status = Find(*kept->record())->Check();
+    const absl::Status status = Find(kept->record())->Check();
     EXPECT_EQ(ReasonOf(status), "FILE_DAMAGED") << byte;
     EXPECT_THAT(std::string(status.message()), HasSubstr(path_ + ": ")) << byte;
     FlipBit(path_, byte, static_cast<int>(byte % 8));
   }
-  EXPECT_TRUE(Find(*kept->record())->Check().ok());
+  EXPECT_TRUE(Find(kept->record())->Check().ok());
 }
 
 TEST_F(MeshFileTest, ADamagedChunkCostsThatChunkAlone) {
@@ -164,7 +165,7 @@ TEST_F(MeshFileTest, ADamagedChunkCostsThatChunkAlone) {
 }
 
 TEST_F(MeshFileTest, AFileThatIsMissingShortOrLongIsDamaged) {
-  const auto record = *Keep(MakeMesh({}))->record();
+  const store::v1::MeshRecord record = Keep(MakeMesh({}))->record();
   const std::string bytes = BytesOfFile(path_);
   for (const uint64_t size : {uint64_t{0}, uint64_t{10}, record.size() - 1, record.size() + 1}) {
     std::filesystem::resize_file(path_, size);
@@ -181,7 +182,7 @@ TEST_F(MeshFileTest, AFileThatIsMissingShortOrLongIsDamaged) {
 
 TEST_F(MeshFileTest, AnObsoleteFileGoesWithItsLastReader) {
   auto kept = Keep(MakeMesh({}));
-  auto found = Find(*kept->record());
+  auto found = Find(kept->record());
   kept->MakeObsolete();
   kept.reset();
   EXPECT_TRUE(std::filesystem::exists(path_));
@@ -222,7 +223,7 @@ TEST_F(MeshFileTest, WritingAndLoadingCanBeCancelled) {
 
 TEST_F(MeshFileTest, ServesManyAtOnce) {
   const auto kept = Keep(MakeMesh({.vertices = 20'000, .simplices = 50'000, .has_moved = true}), 10'000);
-  const auto found = Find(*kept->record());
+  const auto found = Find(kept->record());
   const auto expected = DownloadOf(*kept, true);
   std::vector<std::thread> readers;
   std::vector<int> is_same(4, 0);

@@ -1,4 +1,4 @@
-// A session log that hands all on to another one, for tests that change some of it.
+// Records and files that hand all on to those of another log, for tests that change some of it.
 #ifndef WELLSPACE_TESTS_SERVER_STORE_PASSING_LOG_H_
 #define WELLSPACE_TESTS_SERVER_STORE_PASSING_LOG_H_
 
@@ -11,39 +11,74 @@
 
 namespace wellspace::server {
 
-// Thread safety: that of the other one.
-class PassingLog : public SessionLog {
+// Thread safety: that of the other ones.
+class PassingRecords : public Records {
  public:
-  // REQUIRES:   `log` outlives this.
-  explicit PassingLog(SessionLog& log) : log_(log) {}
+  explicit PassingRecords(std::shared_ptr<SessionLog> log) : log_(std::move(log)) {}
 
-  bool is_durable() const override { return log_.is_durable(); }
-  absl::StatusOr<StoredSessions> Load() override { return log_.Load(); }
-  absl::Status Commit(const SessionChange& change, Survives survives) override { return log_.Commit(change, survives); }
-  void Forget(std::span<const AnswerKey> answers) override { log_.Forget(answers); }
+  bool is_durable() const override { return log_->is_durable(); }
+  uint64_t epoch() const override { return log_->records().epoch(); }
+  absl::StatusOr<StoredSessions> Load() override { return records().Load(); }
+  absl::StatusOr<std::optional<StoredSession>> Take(const std::string& session) override {
+    return records().Take(session);
+  }
+  absl::StatusOr<std::optional<store::v1::AnswerRecord>> FindAnswer(const AnswerKey& request) override {
+    return records().FindAnswer(request);
+  }
+  absl::Status Apply(const SessionChange& change, Survives survives) override {
+    return records().Apply(change, survives);
+  }
+  void Forget(std::span<const AnswerKey> answers) override { records().Forget(answers); }
   absl::StatusOr<std::vector<store::v1::StepRecord::Features>> ReadFeatures(const std::string& session) override {
-    return log_.ReadFeatures(session);
+    return records().ReadFeatures(session);
   }
   absl::StatusOr<std::vector<StoredSizes>> ReadSizes(const std::string& session) override {
-    return log_.ReadSizes(session);
+    return records().ReadSizes(session);
   }
-  std::unique_ptr<PointStore> OpenPoints(const std::string& session, int dimension, uint64_t number,
-                                         std::vector<store::v1::StepRecord::Points> committed) override {
-    return log_.OpenPoints(session, dimension, number, std::move(committed));
+  absl::StatusOr<std::optional<store::v1::SessionRecord>> ReadRecord(const std::string& session) override {
+    return records().ReadRecord(session);
   }
-  void DropPoints(const std::string& session, uint64_t number) override { log_.DropPoints(session, number); }
-  absl::StatusOr<std::shared_ptr<MeshSnapshot>> KeepMesh(const std::string& session, uint64_t revision, core::Mesh mesh,
-                                                         const core::RunContext& context) override {
-    return log_.KeepMesh(session, revision, std::move(mesh), context);
-  }
-  absl::StatusOr<Garbage> RemoveGarbage() override { return log_.RemoveGarbage(); }
-  std::shared_ptr<MeshSnapshot> FindMesh(const std::string& session, const store::v1::SessionRecord& record) override {
-    return log_.FindMesh(session, record);
-  }
+  absl::StatusOr<Census> ReadCensus() override { return records().ReadCensus(); }
 
  private:
-  SessionLog& log_;
+  Records& records() { return log_->records(); }
+
+  const std::shared_ptr<SessionLog> log_;
 };
+
+// Thread safety: that of the other ones.
+class PassingFiles : public Files {
+ public:
+  explicit PassingFiles(std::shared_ptr<SessionLog> log) : log_(std::move(log)) {}
+
+  std::unique_ptr<PointStore> OpenPoints(SessionPoints points) override {
+    return files().OpenPoints(std::move(points));
+  }
+  void DropPoints(const std::string& session, const store::v1::PointsFile& file) override {
+    files().DropPoints(session, file);
+  }
+  absl::StatusOr<std::shared_ptr<MeshSnapshot>> KeepMesh(const std::string& session, uint64_t revision, uint64_t epoch,
+                                                         core::Mesh mesh, const core::RunContext& context) override {
+    return files().KeepMesh(session, revision, epoch, std::move(mesh), context);
+  }
+  std::shared_ptr<MeshSnapshot> FindMesh(const store::v1::SessionRecord& record) override {
+    return files().FindMesh(record);
+  }
+  void RemoveAll(const store::v1::SessionRecord& deleted) override { files().RemoveAll(deleted); }
+  absl::StatusOr<Garbage> RemoveGarbage(const ReadCensus& read) override { return files().RemoveGarbage(read); }
+
+ private:
+  Files& files() { return log_->files(); }
+
+  const std::shared_ptr<SessionLog> log_;
+};
+
+// A log around `log` whose records are made of it and of `arguments`.
+template <typename RecordsAround, typename... Arguments>
+std::unique_ptr<SessionLog> LogAround(const std::shared_ptr<SessionLog>& log, Arguments&&... arguments) {
+  return std::make_unique<SessionLog>(std::make_unique<RecordsAround>(log, std::forward<Arguments>(arguments)...),
+                                      std::make_unique<PassingFiles>(log));
+}
 
 }  // namespace wellspace::server
 

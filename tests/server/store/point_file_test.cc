@@ -1,3 +1,4 @@
+// Points in a file come back as they came; what was not committed is cut off, and flipped bits are found.
 #include "server/store/point_file.h"
 
 #include <unistd.h>

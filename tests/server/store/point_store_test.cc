@@ -1,3 +1,4 @@
+// Points in memory come back as they came, and the last can be taken back.
 #include "server/store/point_store.h"
 
 #include <numeric>

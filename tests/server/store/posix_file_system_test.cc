@@ -1,3 +1,4 @@
+// Files, folders, locks and errors on the real disk.
 #include <filesystem>
 #include <string>
 #include <vector>

@@ -197,7 +197,8 @@ absl::Status SimulatedDisk::Synchronize(Inode& inode, const std::string& path) {
 
 bool SimulatedDisk::IsOmitted(const std::string& path) const {
   return std::ranges::any_of(omitted_, [&](const Omitted& omitted) {
-    return path.ends_with(omitted.end) && (!omitted.is_planted || omitted.is_planted());
+    return (path.ends_with(omitted.end) || path.find(omitted.end + "-") != std::string::npos) &&
+           (!omitted.is_planted || omitted.is_planted());
   });
 }
 

@@ -25,7 +25,7 @@ namespace wellspace::server {
 // Thread safety: none; one thread uses it, and all that works on it.
 class SimulatedDisk {
  public:
-  // What is there after Restart.
+  // The data that a Restart loses.
   enum class Loss {
     kProcess,  // only the process died: all is as it was last written, and may still be lost
     kAll,      // nothing that was not synchronised
@@ -59,15 +59,15 @@ class SimulatedDisk {
   void LimitBytes(uint64_t bytes) { most_bytes_ = bytes; }
   uint64_t UsedBytes() const;
   bool has_failed() const { return has_failed_; }
-  // What the operation that died or failed was.
+  // The operation that died or failed.
   const std::string& failed_operation() const { return failed_operation_; }
-  // From now on files and folders whose paths end so are not synchronised, though it is said, as long as `is_planted`
-  // says so; null: always.
+  // From now on files and folders whose paths end so, or so and numbers behind hyphens, are not synchronised, though it
+  // is said, as long as `is_planted` returns true; null: always.
   void OmitSynchronize(const std::string& end, std::function<bool()> is_planted = nullptr) {
     omitted_.push_back({end, std::move(is_planted)});
   }
 
-  // What the machine finds when it is started again. Ends DieAt and FailAt.
+  // Makes the disk the one that the machine finds when it is started again. Ends DieAt and FailAt.
   void Restart(Loss loss, uint64_t seed);
   // As new.
   void Clear();

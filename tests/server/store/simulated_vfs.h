@@ -1,4 +1,4 @@
-// How SQLite reaches a simulated disk.
+// The VFS by which SQLite reaches a simulated disk.
 #ifndef WELLSPACE_TESTS_SERVER_STORE_SIMULATED_VFS_H_
 #define WELLSPACE_TESTS_SERVER_STORE_SIMULATED_VFS_H_
 
@@ -16,7 +16,7 @@ namespace wellspace::server {
 struct SimulatedVfs {
   static void Register(SimulatedDisk& disk);
 
-  // What SQLite has memory for.
+  // The struct that SQLite has memory for, one for each open file.
   struct OpenFile {
     sqlite3_file base;  // first, as SQLite wants it
     SimulatedDisk* disk;

@@ -1,5 +1,5 @@
 // Each operation of a life fails once: with a full disk nothing is changed and all goes on; with a broken one the log
-// says so once, and acknowledges nothing more. What was acknowledged is there in any case.
+// says so once, and acknowledges nothing more. Acknowledged changes are there in any case.
 #include <array>
 #include <string>
 #include <utility>
@@ -124,8 +124,13 @@ TEST(StoreFaults, AFileThatMayNotBeOpenedIsNotDamaged) {
   }
   const LifeState::Session session = life.state().sessions.at(0);
   ASSERT_TRUE(session.mesh.has_value());
-  const auto points = life.log()->OpenPoints(session.state.name(), 3, 0, {session.steps.at(0).points()});
-  const auto mesh = life.log()->FindMesh(session.state.name(), session.state);
+  const std::vector<store::v1::PointsFile> files = PointsFilesOf(session.state);
+  const auto points = life.log()->files().OpenPoints({.session = session.state.name(),
+                                                      .dimension = 3,
+                                                      .files = files,
+                                                      .committed = {session.steps.at(0).points()},
+                                                      .next = files.back()});
+  const auto mesh = life.log()->files().FindMesh(session.state);
   disk.FailAt(disk.operations(), Fault::kForbidden, 1'000'000);
   for (const absl::Status& status :
        {points->CopyFrom(0, core::RunContext()).status(), points->Append(std::vector<double>{1, 2, 3}),
@@ -139,39 +144,42 @@ TEST(StoreFaults, AFileThatMayNotBeOpenedIsNotDamaged) {
   EXPECT_EQ(life.Check(), "");
 }
 
-// What tenants have filled the disk with.
+// The kind of data that tenants have filled the disk with.
 enum class Filling { kPoints, kMeshes, kRows };
 
-// One session more, and what is in it.
-absl::Status FillOnce(DurableLog& log, Filling filling, uint64_t number) {
-  SessionChange change{.session = SessionName(number), .state = MakeState(number), .answer = MakeAnswer("a", "b", "c")};
-  if (absl::Status status = log.Commit(change); !status.ok()) {
+// One session more, with its data.
+absl::Status FillOnce(SessionLog& log, Filling filling, uint64_t number) {
+  SessionChange change{
+      .session = SessionName(number), .state = MakeState(number), .answer = MakeAnswer("a", absl::StrCat(number), "c")};
+  if (absl::Status status = CommitTo(log, change); !status.ok()) {
     return status;
   }
+  change.answer.reset();
   if (filling == Filling::kPoints) {
-    const std::unique_ptr<PointStore> points = log.OpenPoints(change.session, 3, 0, {});
+    const std::unique_ptr<PointStore> points = log.files().OpenPoints({.session = change.session, .dimension = 3});
     const std::vector<double> coordinates(3000, static_cast<double>(number));
     if (absl::Status status = points->Append(coordinates); !status.ok()) {
       return status;
     }
     change.steps = {MakePointsStep(0, coordinates, 3)};
     change.state->set_points(1000);
-    return points->Synchronize().ok() ? log.Commit(change) : absl::InternalError("not synchronised");
+    return points->Synchronize().ok() ? CommitTo(log, change) : absl::InternalError("not synchronised");
   }
   if (filling == Filling::kMeshes) {
-    const auto mesh = log.KeepMesh(change.session, 1, MakeMesh({.vertices = 500}), core::RunContext());
+    const auto mesh =
+        log.files().KeepMesh(change.session, 1, /*epoch=*/0, MakeMesh({.vertices = 500}), core::RunContext());
     if (!mesh.ok()) {
       return mesh.status();
     }
-    *change.state->mutable_mesh() = *(*mesh)->record();
-    return log.Commit(change);
+    *change.state->mutable_mesh() = (*mesh)->record();
+    return CommitTo(log, change);
   }
   change.sizes = StoredSizes{.number = 1, .parts = {}};
   store::v1::SizesRecord& part = change.sizes->parts.emplace_back();
   for (int i = 0; i < 2000; ++i) {
     part.mutable_samples()->add_sizes(i + static_cast<double>(number));
   }
-  return log.Commit(change);
+  return CommitTo(log, change);
 }
 
 // Deletions find room on a full disk, however it came to be full, also after a start; and then all goes on.
@@ -184,7 +192,7 @@ TEST(StoreFaults, AFullDiskIsEmptiedByThoseWhoFilledIt) {
                                          .files = &disk.files(),
                                          .ballast_bytes = 256 << 10,
                                          .tables = {.vfs = disk.vfs(), .is_exclusive = true}};
-      absl::StatusOr<std::unique_ptr<DurableLog>> log = DurableLog::Open(options);
+      absl::StatusOr<std::unique_ptr<SessionLog>> log = OpenDurableLog(options);
       ASSERT_TRUE(log.ok()) << log.status();
       EXPECT_GE(disk.UsedBytes(), options.ballast_bytes);
       disk.LimitBytes(disk.UsedBytes() + (1 << 20));
@@ -201,23 +209,60 @@ TEST(StoreFaults, AFullDiskIsEmptiedByThoseWhoFilledIt) {
         disk.DieAt(disk.operations());
         log->reset();
         disk.Restart(Loss::kProcess, 1);
-        log = DurableLog::Open(options);
+        log = OpenDurableLog(options);
         ASSERT_TRUE(log.ok()) << where << log.status();
       }
-      const StoredSessions stored = *(*log)->Load();
+      const StoredSessions stored = *(*log)->records().Load();
       for (const StoredSession& session : stored.sessions) {
         SessionChange deletion{.session = session.state.name(), .is_deletion = true};
         deletion.answer = MakeAnswer("tenant", session.state.name(), "deleted");
-        const absl::Status deleted = (*log)->Commit(deletion);
+        const absl::Status deleted = CommitTo(**log, deletion);
         ASSERT_TRUE(deleted.ok()) << where << ", " << session.state.name() << ": " << deleted;
       }
-      EXPECT_TRUE((*log)->Load()->sessions.empty()) << where;
+      EXPECT_TRUE((*log)->records().Load()->sessions.empty()) << where;
       for (uint64_t number = 1000; number < 1010; ++number) {
         const absl::Status again = FillOnce(**log, filling, number);
         EXPECT_TRUE(again.ok()) << where << again;
       }
     }
   }
+}
+
+// However little room a start has, it takes everything over at once, in the room of the ballast if need be, and not
+// only with its first change: the next process finds the epoch of this one.
+TEST(StoreFaults, AStartHasTheRoomOfTheBallast) {
+  constexpr uint64_t kBallast = 256 << 10;
+  constexpr uint64_t kPage = 4096;
+  SimulatedDisk disk;
+  const DurableLogOptions options = {.folder = "/data",
+                                     .files = &disk.files(),
+                                     .ballast_bytes = kBallast,
+                                     .tables = {.vfs = disk.vfs(), .is_exclusive = true}};
+  int given_up = 0;
+  for (uint64_t less = 0; less < kBallast / 2; less += kPage) {
+    disk.Clear();
+    disk.LimitBytes(uint64_t{1} << 40);
+    absl::StatusOr<std::unique_ptr<SessionLog>> log = OpenDurableLog(options);
+    ASSERT_TRUE(log.ok()) << log.status();
+    ASSERT_TRUE(CommitTo(**log, {.session = SessionName(1), .state = MakeState(1)}).ok());
+    disk.DieAt(disk.operations());
+    log->reset();
+    disk.Restart(Loss::kProcess, 1);
+    disk.LimitBytes(disk.UsedBytes() - less);
+    log = OpenDurableLog(options);
+    ASSERT_TRUE(log.ok()) << less << log.status();
+    given_up += disk.SizeOf("/data/ballast") == 0 ? 1 : 0;
+    const uint64_t epoch = (*log)->records().epoch();
+    disk.DieAt(disk.operations());
+    log->reset();
+    disk.Restart(Loss::kProcess, 1);
+    disk.LimitBytes(uint64_t{1} << 40);
+    const absl::StatusOr<std::unique_ptr<SessionTables>> tables =
+        SessionTables::Open("/data/sessions.db", options.tables);
+    ASSERT_TRUE(tables.ok()) << tables.status();
+    EXPECT_EQ((*tables)->Load()->sessions.at(0).epoch, epoch) << less;
+  }
+  EXPECT_GT(given_up, 0);
 }
 
 // After a synchronisation that failed nothing is tried again on the same file: it would succeed, and be wrong.
@@ -275,37 +320,41 @@ TEST(StoreFaults, AStartWithoutRoomReadsAndThenGoesOn) {
   SimulatedDisk disk;
   const DurableLogOptions options = {
       .folder = "/data", .files = &disk.files(), .tables = {.vfs = disk.vfs(), .is_exclusive = true}};
-  absl::StatusOr<std::unique_ptr<DurableLog>> log = nullptr;
+  absl::StatusOr<std::unique_ptr<SessionLog>> log = nullptr;
   // The second change is written and not synchronised, and the process ends.
   for (uint64_t skip = 0; !disk.failed_operation().starts_with("synchronise "); ++skip) {
     log->reset();
     disk.Clear();
-    log = DurableLog::Open(options);
+    log = OpenDurableLog(options);
     ASSERT_TRUE(log.ok()) << log.status();
-    ASSERT_TRUE((*log)->Commit({.session = SessionName(1), .state = MakeState(1)}).ok());
+    ASSERT_TRUE(CommitTo(**log, {.session = SessionName(1), .state = MakeState(1)}).ok());
     disk.FailAt(disk.operations() + skip, Fault::kBroken);
-    ASSERT_FALSE((*log)->Commit({.session = SessionName(1), .state = MakeState(1, 2)}).ok());
+    ASSERT_FALSE(CommitTo(**log, {.session = SessionName(1), .state = MakeState(1, 2)}).ok());
   }
   disk.DieAt(disk.operations());
   log->reset();
   disk.Restart(Loss::kProcess, 1);
 
   disk.FailAt(disk.operations(), Fault::kNoRoom, 1'000'000);
-  log = DurableLog::Open(options);
+  log = OpenDurableLog(options);
   ASSERT_TRUE(log.ok()) << log.status();
-  EXPECT_EQ((*log)->Load()->sessions.size(), 1u);
-  EXPECT_EQ(ReasonOf((*log)->Commit({.session = SessionName(2), .state = MakeState(2)})), "DISK_FULL");
+  const absl::StatusOr<StoredSessions> loaded = (*log)->records().Load();
+  ASSERT_EQ(loaded->sessions.size(), 1u);
+  EXPECT_EQ(ReasonOf(CommitTo(**log, {.session = SessionName(2), .state = MakeState(2)})), "DISK_FULL");
   disk.FailAt(0, Fault::kNoRoom, 0);
-  ASSERT_TRUE((*log)->Commit({.session = SessionName(2), .state = MakeState(2)}).ok());
+  ASSERT_TRUE(CommitTo(**log, {.session = SessionName(2), .state = MakeState(2)}).ok());
+  // As a session does that was loaded.
+  SessionChange restored = {.session = SessionName(1), .epoch = loaded->sessions[0].epoch, .state = MakeState(1, 3)};
+  EXPECT_TRUE((*log)->Commit(restored).ok());
   disk.DieAt(disk.operations());
   log->reset();
   disk.Restart(Loss::kAll, 1);
-  log = DurableLog::Open(options);
+  log = OpenDurableLog(options);
   ASSERT_TRUE(log.ok()) << log.status();
-  EXPECT_EQ((*log)->Load()->sessions.size(), 2u) << "acknowledged behind what may not have been on the disk";
+  EXPECT_EQ((*log)->records().Load()->sessions.size(), 2u) << "acknowledged behind what may not have been on the disk";
 }
 
-// A write-ahead log that ends in the middle, or has other bytes: all before is there, or the start says what is wrong.
+// A write-ahead log that ends in the middle, or has other bytes: all before is there, or the start names the fault.
 TEST(StoreFaults, AWriteAheadLogThatIsTornEndsThere) {
   SimulatedDisk disk;
   StoreLife life(disk);
@@ -319,7 +368,7 @@ TEST(StoreFaults, AWriteAheadLogThatIsTornEndsThere) {
   disk.Flip(wal, size + 2000, 3);  // of the last change, which was not synchronised
   test::SplitMix64 random(1);
   EXPECT_THAT(life.Restart(Loss::kProcess, random), ::testing::StartsWith("found is")) << "it is lost";
-  EXPECT_EQ(life.log()->Load()->sessions.size(), 2u) << "and nothing else";
+  EXPECT_EQ(life.log()->records().Load()->sessions.size(), 2u) << "and nothing else";
 }
 
 }  // namespace

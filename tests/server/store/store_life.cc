@@ -51,6 +51,16 @@ std::vector<StoredSizes> SizesOf(const LifeState::Session& session) {
   return sets;
 }
 
+// `state` has points in `file` from now on, behind those that it has.
+void NameFile(const store::v1::PointsFile& file, store::v1::SessionRecord& state) {
+  std::vector<store::v1::PointsFile> files = PointsFilesOf(state);
+  if (files.empty() || files.back().number() != file.number() || files.back().epoch() != file.epoch()) {
+    files.push_back(file);
+    files.back().set_first(state.points());
+    state.mutable_points_files()->Assign(files.begin(), files.end());
+  }
+}
+
 DurableLogOptions OptionsOf(SimulatedDisk& disk, int& failures) {
   return {.folder = StoreLife::kFolder,
           .files = &disk.files(),
@@ -82,7 +92,7 @@ std::string TextOf(const LifeState& state) {
 }
 
 absl::Status StoreLife::Open() {
-  WELLSPACE_ASSIGN_OR_RETURN(log_, DurableLog::Open(OptionsOf(disk_, failures_)));
+  WELLSPACE_ASSIGN_OR_RETURN(log_, OpenDurableLog(OptionsOf(disk_, failures_)));
   return absl::OkStatus();
 }
 
@@ -110,7 +120,7 @@ absl::Status StoreLife::Do(Action action, uint64_t number) {
     }
     const auto [tenant, request_id] = next.answers.begin()->first;
     forgotten_.insert({tenant, request_id});
-    log_->Forget(std::vector<AnswerKey>{{tenant, request_id}});
+    log_->records().Forget(std::vector<AnswerKey>{{tenant, request_id}});
     SessionChange change{.session = SessionName(number), .answer = NextAnswer()};
     next.answers[{"tenant", change.answer->request_id()}] = *change.answer;
     return Commit(std::move(change), std::move(next));
@@ -132,17 +142,27 @@ absl::Status StoreLife::Do(Action action, uint64_t number) {
   }
 }
 
+store::v1::PointsFile StoreLife::NextFile() const {
+  store::v1::PointsFile file;
+  file.set_number(salt_);
+  file.set_epoch(log_->records().epoch());
+  return file;
+}
+
 store::v1::AnswerRecord StoreLife::NextAnswer() {
   return MakeAnswer("tenant", absl::StrCat(salt_), std::string(salt_ % 7 * 10, 'a'));
 }
 
 absl::Status StoreLife::Create(uint64_t number) {
   LifeState next = state();
-  SessionChange change{.session = SessionName(number), .state = MakeState(number, salt_), .answer = NextAnswer()};
+  SessionChange change{
+      .session = SessionName(number), .is_creation = true, .state = MakeState(number, salt_), .answer = NextAnswer()};
   next.sessions[number].state = *change.state;
   next.answers[{"tenant", change.answer->request_id()}] = *change.answer;
   WELLSPACE_RETURN_IF_ERROR(Commit(std::move(change), std::move(next)));
-  open_[number].points = log_->OpenPoints(SessionName(number), 3, 0, {});
+  Open_& open = open_[number];
+  open.file = NextFile();
+  open.points = log_->files().OpenPoints({.session = SessionName(number), .dimension = 3, .next = open.file});
   return absl::OkStatus();
 }
 
@@ -173,6 +193,7 @@ absl::Status StoreLife::Upload(uint64_t number) {
   SessionChange change{.session = SessionName(number)};
   change.steps = {MakePointsStep(session.state.points(), coordinates, 3)};
   session.points.insert(session.points.end(), coordinates.begin(), coordinates.end());
+  NameFile(open_.at(number).file, session.state);
   session.state.set_points(session.points.size() / 3);
   session.state.set_revision(salt_);
   session.steps.push_back(change.steps[0]);
@@ -188,8 +209,10 @@ absl::Status StoreLife::Upload(uint64_t number) {
 absl::Status StoreLife::Remove(uint64_t number) {
   LifeState next = state();
   LifeState::Session& session = next.sessions.at(number);
-  uint64_t file = salt_;
-  std::unique_ptr<PointStore> store = log_->OpenPoints(SessionName(number), 3, file, {});
+  const store::v1::PointsFile file = NextFile();
+  std::vector<store::v1::PointsFile> dropped = {file};
+  std::unique_ptr<PointStore> store =
+      log_->files().OpenPoints({.session = SessionName(number), .dimension = 3, .next = file});
   std::vector<double> kept;
   for (size_t i = 0; i < session.points.size(); i += 3) {
     if (i / 3 % 4 != salt_ % 4) {
@@ -210,18 +233,25 @@ absl::Status StoreLife::Remove(uint64_t number) {
     session.steps.insert(session.steps.end(), change.steps.begin(), change.steps.end());
     session.points = kept;
     session.state.set_points(kept.size() / 3);
-    session.state.set_points_file(file);
+    session.state.set_points_file(salt_);
+    session.state.clear_points_files();
+    if (!kept.empty()) {
+      *session.state.add_points_files() = file;
+    }
     session.state.set_revision(salt_);
     change.state = session.state;
-    const uint64_t before = state().sessions.at(number).state.points_file();
+    std::vector<store::v1::PointsFile> before = PointsFilesOf(state().sessions.at(number).state);
     WELLSPACE_RETURN_IF_ERROR(Commit(std::move(change), std::move(next)));
     std::swap(store, open_.at(number).points);
-    file = before;
+    dropped = std::move(before);
+    dropped.push_back(std::exchange(open_.at(number).file, file));
     return absl::OkStatus();
   };
   const absl::Status status = make();
   store = nullptr;
-  log_->DropPoints(SessionName(number), file);
+  for (const store::v1::PointsFile& one : dropped) {
+    log_->files().DropPoints(SessionName(number), one);
+  }
   return status;
 }
 
@@ -236,7 +266,8 @@ absl::Status StoreLife::Succeed(uint64_t number) {
   // Of a revision that an operation without success may have had, too.
   const uint64_t revision = session.state.mesh().revision() + 1;
   WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<MeshSnapshot> mesh,
-                             log_->KeepMesh(SessionName(number), revision, MakeMesh(shape), core::RunContext()));
+                             log_->files().KeepMesh(SessionName(number), revision, log_->records().epoch(),
+                                                    MakeMesh(shape), core::RunContext()));
   if (salt_ % 4 == 0) {
     mesh->MakeObsolete();  // no change names it
     return absl::OkStatus();
@@ -247,7 +278,7 @@ absl::Status StoreLife::Succeed(uint64_t number) {
   change.operations.back().set_mesh_revision(salt_);
   session.steps.push_back(change.steps[0]);
   session.operations[1] = change.operations[0];
-  *session.state.mutable_mesh() = *mesh->record();
+  *session.state.mutable_mesh() = mesh->record();
   session.mesh = shape;
   change.state = session.state;
   const absl::Status status = Commit(std::move(change), std::move(next));
@@ -267,16 +298,21 @@ absl::Status StoreLife::Change(uint64_t number, Action action) {
   LifeState next = state();
   LifeState::Session& session = next.sessions.at(number);
   SessionChange change{.session = SessionName(number)};
-  auto survives = SessionLog::Survives::kPowerLoss;
+  auto survives = Survives::kPowerLoss;
   if (action == Action::kUpdate || action == Action::kTouch) {
     (*session.state.mutable_labels())["label"] = absl::StrCat(salt_);
-    survives = action == Action::kTouch ? SessionLog::Survives::kProcessDeath : survives;
+    survives = action == Action::kTouch ? Survives::kProcessDeath : survives;
   } else if (action == Action::kAddFeatures) {
     store::v1::StepRecord& step = change.steps.emplace_back();
-    step.mutable_features()->mutable_segments()->add_ends(static_cast<uint32_t>(salt_));
-    step.mutable_features()->mutable_segments()->add_ends(static_cast<uint32_t>(salt_ + 1));
+    const bool is_segment = salt_ % 2 == 0;
+    for (uint64_t corner = 0; corner < (is_segment ? 2 : 3); ++corner) {
+      (is_segment ? step.mutable_features()->mutable_segments()->mutable_ends()
+                  : step.mutable_features()->mutable_triangles()->mutable_corners())
+          ->Add(static_cast<uint32_t>(salt_ + corner));
+    }
     session.steps.push_back(step);
-    session.state.set_segments(session.state.segments() + 1);
+    session.state.set_segments(session.state.segments() + (is_segment ? 1 : 0));
+    session.state.set_triangles(session.state.triangles() + (is_segment ? 0 : 1));
   } else if (action == Action::kSetSizes) {
     // The second set before this one goes.
     change.sizes = StoredSizes{.number = salt_, .parts = {}};
@@ -313,12 +349,13 @@ absl::Status StoreLife::Change(uint64_t number, Action action) {
   }
   const absl::Status status = Commit(std::move(change), std::move(next), survives);
   if (status.ok() && action == Action::kDelete) {
+    log_->files().DropPoints(SessionName(number), open_.at(number).file);
     open_.erase(number);
   }
   return status;
 }
 
-absl::Status StoreLife::Commit(SessionChange change, LifeState next, SessionLog::Survives survives) {
+absl::Status StoreLife::Commit(SessionChange change, LifeState next, Survives survives) {
   for (const auto& answer : forgotten_) {
     next.answers.erase(answer);
   }
@@ -338,15 +375,16 @@ absl::Status StoreLife::Commit(SessionChange change, LifeState next, SessionLog:
   return status;
 }
 
-void StoreLife::Acknowledge(SessionLog::Survives survives) {
+void StoreLife::Acknowledge(Survives survives) {
   ++acknowledgments_;
   acknowledged_ = states_.size() - 1;
-  if (survives == SessionLog::Survives::kPowerLoss) {
+  if (survives == Survives::kPowerLoss) {
     durable_acknowledged_ = acknowledged_;
   }
 }
 
-absl::Status StoreLife::CommitToLog(SessionChange change, SessionLog::Survives survives) {
+absl::Status StoreLife::CommitToLog(SessionChange change, Survives survives) {
+  change.epoch = log_->records().epoch();
   if (bugs_.answers_before_commit) {
     if (late_.has_value()) {
       WELLSPACE_RETURN_IF_ERROR(log_->Commit(late_->first, late_->second));
@@ -355,7 +393,7 @@ absl::Status StoreLife::CommitToLog(SessionChange change, SessionLog::Survives s
     return absl::OkStatus();
   }
   if (bugs_.answers_in_another_transaction && change.answer.has_value()) {
-    SessionChange answer{.session = change.session, .answer = std::move(change.answer)};
+    SessionChange answer{.session = change.session, .epoch = change.epoch, .answer = std::move(change.answer)};
     change.answer.reset();
     WELLSPACE_RETURN_IF_ERROR(log_->Commit(change, survives));
     return log_->Commit(answer, survives);
@@ -391,7 +429,7 @@ std::string StoreLife::Restart(SimulatedDisk::Loss loss, test::SplitMix64& rando
 
 // Takes the state that was found for the only one.
 std::string StoreLife::FindState(size_t least) {
-  const auto stored = log_->Load();
+  const auto stored = log_->records().Load();
   if (!stored.ok()) {
     return absl::StrCat("the records cannot be read: ", stored.status().ToString());
   }
@@ -411,8 +449,14 @@ std::string StoreLife::FindState(size_t least) {
             committed.push_back(step.points());
           }
         }
-        open_[number].points = log_->OpenPoints(SessionName(number), 3, session.state.points_file(), committed);
-        open_[number].mesh = log_->FindMesh(SessionName(number), session.state);
+        Open_& open = open_[number];
+        open.file = NextFile();
+        open.points = log_->files().OpenPoints({.session = SessionName(number),
+                                                .dimension = 3,
+                                                .files = PointsFilesOf(session.state),
+                                                .committed = committed,
+                                                .next = open.file});
+        open_[number].mesh = log_->files().FindMesh(session.state);
       }
       return "";
     }
@@ -423,7 +467,7 @@ std::string StoreLife::FindState(size_t least) {
 }
 
 std::string StoreLife::Check() {
-  const auto stored = log_->Load();
+  const auto stored = log_->records().Load();
   if (!stored.ok()) {
     return absl::StrCat("the records cannot be read: ", stored.status().ToString());
   }
@@ -456,11 +500,11 @@ std::string StoreLife::CheckFiles(const LifeState& expected, const StoredSession
     if (!again.ok() || TextOf(*again) != TextOf(session.applied)) {
       return absl::StrCat("the state of ", found.state.name(), ": ", again.status().ToString());
     }
-    const auto features = log_->ReadFeatures(found.state.name());
+    const auto features = log_->records().ReadFeatures(found.state.name());
     if (!features.ok() || TextOfFeatures(*features) != TextOfFeatures(FeaturesOf(session))) {
       return absl::StrCat("features of ", found.state.name(), ": ", features.status().ToString());
     }
-    const auto sizes = log_->ReadSizes(found.state.name());
+    const auto sizes = log_->records().ReadSizes(found.state.name());
     if (!sizes.ok() || TextOfSizes(*sizes) != TextOfSizes(SizesOf(session))) {
       return absl::StrCat("sizes of ", found.state.name(), ": ", sizes.status().ToString());
     }
@@ -471,8 +515,8 @@ std::string StoreLife::CheckFiles(const LifeState& expected, const StoredSession
     if (!session.mesh.has_value()) {
       continue;
     }
-    const auto mesh = DownloadOf(*log_->FindMesh(found.state.name(), found.state), true);
-    const auto loaded = log_->FindMesh(found.state.name(), found.state)->Load(context);
+    const auto mesh = DownloadOf(*log_->files().FindMesh(found.state), true);
+    const auto loaded = log_->files().FindMesh(found.state)->Load(context);
     const core::Mesh made = MakeMesh(*session.mesh);
     if (!mesh.ok() || !loaded.ok() || loaded->points != made.points || loaded->simplices != made.simplices) {
       return absl::StrCat("the mesh of ", found.state.name(), ": ", mesh.status().ToString());
@@ -490,9 +534,9 @@ std::string StoreLife::CheckFolder(const LifeState& expected) {
   for (const std::string& name : disk_.List(paths.files())) {
     bool is_named = false;
     for (const auto& [number, session] : expected.sessions) {
-      const std::string path = paths.files() + "/" + name;
-      is_named |= path == paths.points(session.state.name(), session.state.points_file()) ||
-                  path == paths.mesh(session.state.name(), session.state.mesh().revision());
+      std::vector<std::string> named = FilesOf(paths, session.state);
+      named.push_back(paths.points(session.state.name(), open_.at(number).file));
+      is_named |= std::ranges::find(named, paths.files() + "/" + name) != named.end();
     }
     if (!is_named) {
       return absl::StrCat("a file too many: ", name);

@@ -1,4 +1,4 @@
-// What a server does with its log, and a model of what has to be there after a crash.
+// The work of a server with its log, and a model of the data that have to be there after a crash.
 #ifndef WELLSPACE_TESTS_SERVER_STORE_STORE_LIFE_H_
 #define WELLSPACE_TESTS_SERVER_STORE_STORE_LIFE_H_
 
@@ -28,14 +28,14 @@ struct LifeState {
     std::map<uint64_t, store::v1::OperationRecord> operations;
     std::vector<double> points;
     std::optional<MeshShape> mesh;
-    SessionState applied;  // what Apply has made of its changes
+    SessionState applied;  // Apply of its changes
   };
 
   std::map<uint64_t, Session> sessions;                                            // by number
   std::map<std::pair<std::string, std::string>, store::v1::AnswerRecord> answers;  // by tenant and request_id
 };
 
-// A server's work on a simulated disk, one change at a time. What a restart finds has to be the state after one of its
+// A server's work on a simulated disk, one change at a time. A restart has to find the state after one of its
 // changes: after the last that was acknowledged, or after the one that was under way.
 //
 // Thread safety: none.
@@ -75,39 +75,41 @@ class StoreLife {
   absl::Status DoAnything(test::SplitMix64& random);
 
   // Ends the process as a crash does, restarts the machine, and opens the log again, with crashes meanwhile, if
-  // `crashes_again` is drawn. What is wrong with what is found then; nothing: all is as it should be.
+  // `crashes_again` is drawn. Returns the fault of the log that is found; empty: all is as it should be.
   std::string Restart(SimulatedDisk::Loss loss, test::SplitMix64& random);
 
-  // What is wrong with what the log says now, and has in its files.
+  // Compares the log's records and files with the model. Returns the fault, or "".
   std::string Check();
-  // The same of what CheckData says, and of a start on what is there; the log is open again then.
+  // The same, by CheckData, and by a start on the folder; the log is open again then.
   std::string CheckWhole();
-  // How often the log has said that it has failed for good.
+  // The number of times that the log has said that it has failed for good.
   int failures() const { return failures_; }
-  // How many changes it has acknowledged.
+  // The number of changes that it has acknowledged.
   int acknowledgments() const { return acknowledgments_; }
-  DurableLog* log() { return log_.get(); }
+  SessionLog* log() { return log_.get(); }
   const LifeState& state() const { return states_[acknowledged_]; }
 
   static constexpr char kFolder[] = "/data";
 
  private:
-  // What a server has of a session in memory.
+  // The parts of a session that a server has in memory.
   struct Open_ {
+    store::v1::PointsFile file;  // where points are appended
     std::unique_ptr<PointStore> points;
     std::shared_ptr<MeshSnapshot> mesh;
   };
 
+  // The file that points of a session come to which is created, or opened, now.
+  store::v1::PointsFile NextFile() const;
   absl::Status Create(uint64_t number);
   absl::Status Upload(uint64_t number);
   // Takes some points out.
   absl::Status Remove(uint64_t number);
   absl::Status Succeed(uint64_t number);
   absl::Status Change(uint64_t number, Action action);
-  absl::Status Commit(SessionChange change, LifeState next,
-                      SessionLog::Survives survives = SessionLog::Survives::kPowerLoss);
-  absl::Status CommitToLog(SessionChange change, SessionLog::Survives survives);
-  void Acknowledge(SessionLog::Survives survives);
+  absl::Status Commit(SessionChange change, LifeState next, Survives survives = Survives::kPowerLoss);
+  absl::Status CommitToLog(SessionChange change, Survives survives);
+  void Acknowledge(Survives survives);
   store::v1::AnswerRecord NextAnswer();
   void Close();
   std::string FindState(size_t least);
@@ -116,7 +118,7 @@ class StoreLife {
 
   SimulatedDisk& disk_;
   const Bugs bugs_;
-  std::unique_ptr<DurableLog> log_;
+  std::unique_ptr<SessionLog> log_;
   std::map<uint64_t, Open_> open_;
   // After each change; the last one may have failed.
   std::vector<LifeState> states_ = std::vector<LifeState>(1);
@@ -126,7 +128,7 @@ class StoreLife {
   uint64_t salt_ = 0;                                        // makes each change another
   int failures_ = 0;
   int acknowledgments_ = 0;
-  std::optional<std::pair<SessionChange, SessionLog::Survives>> late_;  // with answers_before_commit
+  std::optional<std::pair<SessionChange, Survives>> late_;  // with answers_before_commit
 };
 
 // The text of all that is in it but the files.

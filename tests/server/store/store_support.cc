@@ -93,6 +93,13 @@ absl::StatusOr<std::string> DownloadOf(const MeshSnapshot& mesh, bool with_bound
   return all;
 }
 
+absl::Status CommitTo(SessionLog& log, SessionChange change, Survives survives) {
+  change.epoch = log.records().epoch();
+  WELLSPACE_ASSIGN_OR_RETURN(const auto there, log.records().ReadRecord(change.session));
+  change.is_creation = change.state.has_value() && !there.has_value();
+  return log.Commit(change, survives);
+}
+
 std::string SessionName(uint64_t number) { return absl::StrCat("sessions/", absl::Hex(number, absl::kZeroPad8)); }
 
 store::v1::SessionRecord MakeState(uint64_t number, uint64_t revision) {

@@ -1,4 +1,4 @@
-// What the tests of the store share: folders that go away, records and meshes to write down, what they are as text.
+// Helpers of the tests of the store: folders that go away, records and meshes to write down, and their text.
 #ifndef WELLSPACE_TESTS_SERVER_STORE_STORE_SUPPORT_H_
 #define WELLSPACE_TESTS_SERVER_STORE_STORE_SUPPORT_H_
 
@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/mesh.h"
+#include "core/mesh/mesh.h"
 #include "grpcpp/support/byte_buffer.h"
 #include "server/sessions/session_state.h"
 #include "server/store/file_system.h"
@@ -45,6 +45,9 @@ std::string BytesOf(const grpc::ByteBuffer& buffer);
 
 // All that a download of the mesh brings, or the error.
 absl::StatusOr<std::string> DownloadOf(const MeshSnapshot& mesh, bool with_boundary);
+
+// Commits `change` as the owner that has opened `log`; a session that is not there yet is created.
+absl::Status CommitTo(SessionLog& log, SessionChange change, Survives survives = Survives::kPowerLoss);
 
 // "sessions/" and the number, in hexadecimal.
 std::string SessionName(uint64_t number);

@@ -1,4 +1,4 @@
-// Bits of the write-ahead log that flip, and logs that are torn, cut or gone: what was acknowledged is there, or the
+// Bits of the write-ahead log that flip, and logs that are torn, cut or gone: all acknowledged data are there, or the
 // start says that it is not.
 #include "server/store/write_ahead_log.h"
 
@@ -30,12 +30,12 @@ class WriteAheadLogTest : public ::testing::Test {
   // Some sessions, each committed for itself; then all as a process leaves it that is killed.
   void Live(int checkpoint_pages = 1000, uint64_t sessions = kSessions) {
     const TestFolder live;
-    auto log = DurableLog::Open({.folder = live.path(), .tables = {.checkpoint_pages = checkpoint_pages}});
+    auto log = OpenDurableLog({.folder = live.path(), .tables = {.checkpoint_pages = checkpoint_pages}});
     ASSERT_TRUE(log.ok()) << log.status();
     for (uint64_t number = 1; number <= sessions; ++number) {
-      ASSERT_TRUE((*log)->Commit({.session = SessionName(number), .state = MakeState(number)}).ok());
+      ASSERT_TRUE(CommitTo(**log, {.session = SessionName(number), .state = MakeState(number)}).ok());
     }
-    text_ = TextOf(*(*log)->Load());
+    text_ = TextOf(*(*log)->records().Load());
     Copy(live.path(), killed_.path());
   }
 
@@ -53,14 +53,14 @@ class WriteAheadLogTest : public ::testing::Test {
     return tried_->path();
   }
 
-  // What a start on the folder says; nothing: it has all that was acknowledged.
+  // The error of a start on the folder; empty: all acknowledged data are there.
   std::string Start(const std::string& folder) {
-    const auto log = DurableLog::Open({.folder = folder});
+    const auto log = OpenDurableLog({.folder = folder});
     if (!log.ok()) {
       EXPECT_EQ(ReasonOf(log.status()), "FILE_DAMAGED");
       return std::string(log.status().message());
     }
-    EXPECT_EQ(TextOf(*(*log)->Load()), text_) << "taken back without a word";
+    EXPECT_EQ(TextOf(*(*log)->records().Load()), text_) << "taken back without a word";
     return "";
   }
 
@@ -120,7 +120,7 @@ TEST_F(WriteAheadLogTest, AFlippedBitIsRefusedOrHarmlessInALaterLog) {
   EXPECT_GT(refused, 50);
 }
 
-// As a release has left it that wrote no mark: what the frames themselves show.
+// As a release has left it that wrote no mark: the frames themselves show the damage.
 TEST_F(WriteAheadLogTest, WithoutAMarkFramesBehindABadOneShowThatItIsNoTornTail) {
   Live();
   std::filesystem::remove(killed_.path() + "/sessions.db-mark");
@@ -150,11 +150,11 @@ TEST_F(WriteAheadLogTest, ALogThatIsCutOrGoneIsMissed) {
   std::filesystem::remove(folder + "/sessions.db-wal");
   EXPECT_THAT(Start(folder), HasSubstr("the file is missing, and "));
   EXPECT_TRUE(std::filesystem::remove(folder + "/sessions.db-mark"));
-  const auto log = DurableLog::Open({.folder = folder});
+  const auto log = OpenDurableLog({.folder = folder});
   EXPECT_TRUE(log.ok()) << "as the message has advised: " << log.status();
 }
 
-// What was being written when the power went is no damage, whatever is there of it.
+// A write that was under way when the power went is no damage, whatever is there of it.
 TEST_F(WriteAheadLogTest, WhatWasNotAcknowledgedMayBeTorn) {
   Live();
   const std::string folder = killed_.path();
@@ -198,8 +198,8 @@ TEST_F(WriteAheadLogTest, AMarkThatIsDamagedIsMadeAgain) {
 TEST_F(WriteAheadLogTest, AServerThatHasEndedNeedsNone) {
   const TestFolder folder;
   {
-    const auto log = *DurableLog::Open({.folder = folder.path()});
-    ASSERT_TRUE(log->Commit({.session = SessionName(1), .state = MakeState(1)}).ok());
+    const auto log = *OpenDurableLog({.folder = folder.path()});
+    ASSERT_TRUE(CommitTo(*log, {.session = SessionName(1), .state = MakeState(1)}).ok());
     const auto mark = *LogMark::Read(PosixFileSystem(), folder.path() + "/sessions.db");
     EXPECT_GT(mark->frames, 0u);
     EXPECT_FALSE(mark->is_in_database);

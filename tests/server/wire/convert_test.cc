@@ -1,3 +1,4 @@
+// Parameters and points of requests: defaults, limits, and errors that name the field.
 #include "server/wire/convert.h"
 
 #include <cmath>
@@ -101,7 +102,7 @@ TEST(ParametersFromProto, TakesEveryField) {
   EXPECT_TRUE(parameters->keep_vertices);
 }
 
-// What is not sent is the default; what a session says of itself can be sent as it is.
+// An option that is not sent has its default; a session's own parameters can be sent as they are.
 TEST(ParametersFromProto, TellsAZeroFromNothing) {
   v1::MeshParameters message = UnitCubeParameters();
   message.set_gradation(0);
@@ -269,7 +270,7 @@ v1::MeshPointsRequest PointsRequest(const std::vector<double>& coordinates) {
   return request;
 }
 
-// What `receiver` says to `request`.
+// The answer of `receiver` to `request`.
 grpc::Status Accept(CloudReceiver& receiver, v1::MeshPointsRequest request) {
   return ToGrpcStatus(receiver.Accept(&request));
 }
@@ -405,8 +406,8 @@ TEST(CloudReceiver, AcceptsAsManySegmentsAndSeedsAsPoints) {
     seeds.mutable_faces()->add_seeds();
   }
   EXPECT_EQ(DetailsOf(Accept(receiver, seeds)).reason, "TOO_MANY_POINTS");
-  EXPECT_EQ(receiver.features().segment_count(), 10u);
-  EXPECT_EQ(receiver.features().seed_count(), 0u);
+  EXPECT_EQ(receiver.features().counts().segments, 10u);
+  EXPECT_EQ(receiver.features().counts().seeds, 0u);
 }
 
 TEST(CloudReceiver, TakesSegmentsIn2DAlone) {

@@ -1,3 +1,4 @@
+// Errors as clients see them: code, reason, field and when to retry.
 #include "server/wire/errors.h"
 
 #include <new>
@@ -5,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "core/mesher.h"
+#include "core/meshers/mesher.h"
 #include "google/protobuf/text_format.h"
 #include "google/rpc/error_details.pb.h"
 #include "gtest/gtest.h"
@@ -27,8 +28,13 @@ std::string Sent(const absl::Status& status) {
 }
 
 TEST(MakeError, EveryReasonHasACode) {
-  for (int number = 1; number <= v1::ErrorReason_MAX; ++number) {
-    ASSERT_TRUE(v1::ErrorReason_IsValid(number)) << number;
+  const google::protobuf::EnumDescriptor& reasons = *v1::ErrorReason_descriptor();
+  EXPECT_GT(reasons.value_count(), 40);
+  for (int i = 0; i < reasons.value_count(); ++i) {  // their numbers have gaps
+    const int number = reasons.value(i)->number();
+    if (number == v1::ERROR_REASON_UNSPECIFIED) {
+      continue;
+    }
     const auto reason = static_cast<v1::ErrorReason>(number);
     const grpc::Status status = ToGrpcStatus(MakeError(reason, "why"));
     EXPECT_EQ(status.error_message(), "why");
@@ -65,7 +71,7 @@ TEST(ToGrpcStatus, RepeatsMemoryLimitsOnlyWhereItHelps) {
   EXPECT_FALSE(DetailsOf(MemoryLimitError("x", false)).may_retry);
 }
 
-// What the core says of a domain, by points, segments and faces that it makes.
+// The core's error for a domain, by points, segments and faces that it makes.
 ErrorDetails RefusalOf(const std::vector<uint32_t>& ends, const std::vector<int32_t>& markers,
                        const std::vector<core::FaceSeed>& seeds, core::FaceRule faces = core::FaceRule::kHoles) {
   const std::vector<double> points = {0, 0, 4, 0, 4, 4, 0, 4, 2, 1e-17};

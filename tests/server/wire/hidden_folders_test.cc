@@ -1,3 +1,4 @@
+// Folders of the server stay out of what clients see.
 #include "server/wire/hidden_folders.h"
 
 #include <filesystem>

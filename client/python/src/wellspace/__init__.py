@@ -13,18 +13,21 @@ from . import errors, statistics
 from ._cells import Cell, Cells
 from ._channel import Credentials
 from ._client import Client, MeshArguments, Server, client_of
-from ._domain import DomainArguments, RegionPolygon, RegionSeed
+from ._domain import DomainArguments
 from ._dual import DualCells
 from ._locate import Located
 from ._mesh import CORNER, REPAIR, STEINER, Mesh
 from ._operations import Operation
 from ._parameters import Parameters, takes
+from ._plane import PlaneArguments, RegionPolygon, RegionSeed
 from ._progress import Progress, ProgressOption
 from ._retry import CancelToken, RetryPolicy
 from ._server import LocalServer
 from ._session_info import SessionInfo
 from ._sessions import Session
 from ._sizes import SizeArguments
+from ._surface import SolidSeed, TriangleArguments
+from ._surface_files import SurfaceFile, read_surface
 from ._version import __version__
 from ._view import Plot
 from .errors import (
@@ -49,7 +52,7 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
 
-@takes(DomainArguments, SizeArguments, Parameters)
+@takes(DomainArguments, PlaneArguments, TriangleArguments, SizeArguments, Parameters)
 def mesh(
     points: Any,
     *,
@@ -60,10 +63,11 @@ def mesh(
     cancel: CancelToken | None = None,
     **arguments: Unpack[MeshArguments],
 ) -> Mesh:
-    """Meshes points, and in 2-D segments between them.
+    """Meshes points, or the domain that segments in 2-D or triangles in 3-D bound.
 
-    Each point becomes a vertex, with its bits unchanged, and vertices are added until every simplex is as good as
-    asked for. The mesh depends neither on the order of the points nor on the number of threads.
+    Each point becomes a vertex, with its bits unchanged, but for corners of triangles, and vertices are added until
+    every simplex is as good as asked for. The mesh depends neither on the order of the points nor on the number of
+    threads.
 
     Parameters
     ----------
@@ -88,7 +92,7 @@ def mesh(
     Raises
     ------
     InvalidArgumentError
-        A parameter, a point or a segment is not valid; its `field` says which.
+        A parameter, a point, a segment or a triangle is not valid; its `field` says which.
     LimitError
         The mesh would have more vertices than `max_vertices`, or need more memory than there is.
     UnavailableError, DeadlineError, CancelledError, CredentialsError, ServerNotInstalledError
@@ -98,7 +102,7 @@ def mesh(
     )
 
 
-@takes(DomainArguments, SizeArguments, Parameters)
+@takes(DomainArguments, PlaneArguments, TriangleArguments, SizeArguments, Parameters)
 def estimate(
     points: Any,
     *,
@@ -149,12 +153,15 @@ __all__ = [
     "ServerNotInstalledError",
     "Session",
     "SessionInfo",
+    "SolidSeed",
     "Statistics",
+    "SurfaceFile",
     "UnavailableError",
     "WrongStateError",
     "__version__",
     "errors",
     "estimate",
     "mesh",
+    "read_surface",
     "statistics",
 ]

@@ -1,4 +1,4 @@
-"""What users give, as arrays that are right, or an error that names the row."""
+"""The arguments of users, as arrays that are right, or an error that names the row."""
 
 from __future__ import annotations
 

@@ -21,14 +21,14 @@ T = TypeVar("T")
 
 @dataclasses.dataclass(frozen=True)
 class CallOptions:
-    """What every call takes besides its arguments."""
+    """The options that every call takes besides its arguments."""
 
     timeout: float | None = None  # seconds for all attempts together
     cancel: CancelToken | None = None
     request_id: str = ""
 
     def id_or_new(self) -> str:
-        """One for a call that changes something, so that what is repeated after a lost connection is done once."""
+        """One for a call that changes something, so that a call repeated after a lost connection is done once."""
         return self.request_id or uuid.uuid4().hex
 
 
@@ -55,7 +55,7 @@ class Calls:
         self._retrier = retrier
 
     def to_this_server(self) -> Calls:
-        """The same, to no other server: for what ends with it."""
+        """The same, to no other server: for sessions, which end with it."""
         return Calls(self._link, self._retrier)
 
     def run(self, options: CallOptions, make: Callable[[Attempt], T]) -> T:

@@ -1,4 +1,4 @@
-"""The channel to a server: its address, and what it is shown."""
+"""The channel to a server: its address, and the client's credentials."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ import grpc
 
 from .errors import InvalidArgumentError, NotFoundError, WrongStateError
 
-_MAX_RESPONSE_BYTES = 4 << 20  # above what the server sends
+_MAX_RESPONSE_BYTES = 4 << 20  # above the largest message of a server
 _OPTIONS = [
     ("grpc.max_receive_message_length", _MAX_RESPONSE_BYTES),
     # A server whose machine has vanished is noticed by pings.
     ("grpc.keepalive_time_ms", 20_000),
     ("grpc.keepalive_timeout_ms", 10_000),
-    # How soon after a lost connection a new one is tried, and how much later at most.
+    # The delay of the first attempt after a lost connection, and the largest delay of a later one.
     ("grpc.initial_reconnect_backoff_ms", 200),
     ("grpc.max_reconnect_backoff_ms", 5_000),
 ]
@@ -26,7 +26,7 @@ _OPTIONS = [
 
 @dataclasses.dataclass(frozen=True)
 class Credentials:
-    """What a client shows a server, and what it wants to be shown.
+    """Credentials that a client shows a server, and those that it wants to be shown.
 
     Attributes
     ----------

@@ -27,7 +27,7 @@ import numpy.typing as npt
 _POLYNOMIAL = 0x82F63B78  # reflected: bit 31 - k is the coefficient of x^k
 _ALL_ONES = 0xFFFFFFFF
 
-# How far behind a byte of the front it is added. Unit: s.
+# The distances behind a byte of the front at which it is added. Unit: s.
 _DISTANCES = (5685 - 1362, 5685 - 426, 5685)
 _BLOCK, _, _REACH = _DISTANCES  # a longer front than _BLOCK would be added to itself
 
@@ -81,7 +81,7 @@ def _extend(crc: int, octets: Octets) -> int:
         for octet in octets.tolist():
             register = _byte_table()[(register ^ octet) & 0xFF] ^ (register >> 8)
         return register ^ _ALL_ONES
-    # What the bytes before have left is added to the first four.
+    # The checksum of the bytes before is added to the first four.
     rest = _fold(octets, np.frombuffer(register.to_bytes(4, "little"), np.uint8))
     return _parities(rest.view(np.uint64)) ^ _ALL_ONES
 
@@ -131,7 +131,7 @@ def _parities(words: npt.NDArray[np.uint64]) -> int:
 @functools.cache
 def _masks() -> npt.NDArray[np.uint64]:
     """32 x (_REST / 8): which bits of the last words of a message make bit k of its checksum."""
-    # What each bit of the last byte is worth; then of the byte before, which one more byte of zeros follows.
+    # The worth of each bit of the last byte; then of the byte before, which one more byte of zeros follows.
     worth = np.array([_byte_table()[1 << bit] for bit in range(8)], np.uint32)
     table = np.array(_byte_table(), np.uint32)
     worths = np.empty((_REST, 8), np.uint32)

@@ -1,4 +1,4 @@
-"""A client of a server: meshes, estimates, and what the server says of itself."""
+"""A client of a server: meshes, estimates, and information about the server."""
 
 from __future__ import annotations
 
@@ -11,16 +11,18 @@ from . import _api, _wire
 from ._arrays import coordinates
 from ._calls import Calls, CallOptions, Link, next_page, parse
 from ._channel import Credentials, open_channel
-from ._domain import DomainArguments, make_domain
+from ._domain import Bounds, DomainArguments
 from ._mesh import Mesh, mesh_of
 from ._messages import messages_of, point_chunks, receive
-from ._parameters import Parameters, fill, helpful_threads, split, takes
+from ._parameters import SURFACE_NUMBERS, Parameters, fill, helpful_threads, split, takes
+from ._plane import PlaneArguments, make_plane
 from ._progress import OnProgress, ProgressOption, progress_of, told
 from ._receiver import MeshReceiver
 from ._retry import Attempt, CancelToken, Retrier, RetryPolicy
 from ._server import LocalServer, is_shared, shared_server
 from ._session_info import SessionInfo, info_of_session
 from ._sizes import SizeArguments, make_size_field
+from ._surface import Surface, SurfaceArguments, TriangleArguments, make_surface
 from .errors import InvalidArgumentError
 from .statistics import Estimate, ServerInfo, info_of
 from .statistics import fill as fill_dataclass
@@ -31,14 +33,14 @@ if TYPE_CHECKING:
 _WAITING = 1  # PHASE_WAITING: the work has not begun
 
 
-class MeshArguments(DomainArguments, SizeArguments, Parameters, total=False):
-    """What `mesh` and `estimate` take besides points."""
+class MeshArguments(PlaneArguments, TriangleArguments, SizeArguments, Parameters, total=False):
+    """The arguments of `mesh` and `estimate` besides points."""
 
 
 class Client:
     """Talks to one server. Thread-safe.
 
-    What a lost connection interrupted is made again, once each; uploads, watches and downloads go on where they were.
+    Calls are repeated after a lost connection, once each; uploads, watches and downloads go on where they were.
 
     Parameters
     ----------
@@ -46,9 +48,9 @@ class Client:
         ``"HOST:PORT"``. None: ``$WELLSPACE_SERVER`` if that is set, with ``$WELLSPACE_TOKEN``; else a server of this
         process's own, which is started if need be.
     credentials : Credentials
-        What to show the server, and what to be shown.
+        Those to show the server, and those to be shown.
     retry : RetryPolicy
-        How patient to be.
+        The patience with the server.
     """
 
     def __init__(
@@ -93,7 +95,7 @@ class Client:
     def __exit__(self, *exception: Any) -> None:
         self.close()
 
-    @takes(DomainArguments, SizeArguments, Parameters)
+    @takes(DomainArguments, PlaneArguments, TriangleArguments, SizeArguments, Parameters)
     def mesh(
         self,
         points: Any,
@@ -104,7 +106,7 @@ class Client:
         cancel: CancelToken | None = None,
         **arguments: Unpack[MeshArguments],
     ) -> Mesh:
-        """Meshes points, and in 2-D segments between them. See `wellspace.mesh`, which has the same arguments."""
+        """Meshes points, or a domain of segments or triangles between them; arguments are those of `wellspace.mesh`."""
         cloud = _Cloud(points, arguments, "mesh")
         with told(progress) as on_progress:
             return self._calls.run(
@@ -131,7 +133,7 @@ class Client:
         receiver.finish()
         return mesh_of(receiver)
 
-    @takes(DomainArguments, SizeArguments, Parameters)
+    @takes(DomainArguments, PlaneArguments, TriangleArguments, SizeArguments, Parameters)
     def estimate(
         self,
         points: Any,
@@ -150,7 +152,7 @@ class Client:
         return fill_dataclass(Estimate, self._calls.run(CallOptions(timeout=timeout, cancel=cancel), attempt_once))
 
     def info(self, *, timeout: float | None = None) -> ServerInfo:
-        """What the server is, accepts and does."""
+        """The version of the server, its limits and its load."""
         request = _api.message("GetServerInfoRequest")()
         return info_of(
             self._calls.unary(
@@ -180,7 +182,7 @@ class Client:
             request.page_token = next_page(request.page_token, page.next_page_token)
 
 
-# What the functions of the package take for a server.
+# The values that the functions of the package take for a server.
 Server = Union[str, LocalServer, Client, None]
 
 
@@ -224,23 +226,38 @@ os.register_at_fork(after_in_child=_forget_clients)
 
 
 class _Cloud:
-    """Points, and in 2-D segments, with what is asked of their mesh; checked."""
+    """Points, and the features of a domain, with the demands on their mesh; checked."""
 
     def __init__(self, points: Any, arguments: Mapping[str, Any], function: str) -> None:
-        domain, sizes, parameters = split(function, arguments, DomainArguments, SizeArguments, Parameters)
+        kinds = (PlaneArguments, SurfaceArguments, SizeArguments, Parameters)
+        plane, surface, sizes, parameters = split(function, arguments, *kinds)
         self.points = coordinates(points, "points")
-        self.domain = None
-        if domain:
-            if self.points.shape[1] != 2:
-                name = next(iter(domain))
-                raise InvalidArgumentError(
-                    f"{name}: for points in 2-D only; these are in {self.points.shape[1]}-D", field=name
-                )
-            self.domain = make_domain(domain, len(self.points), "box" in parameters)
+        self.bounds = self._bounds_of(plane, surface, "box" in parameters)
         self.sizes = make_size_field(sizes, self.points.shape[1]) if sizes else None
         self.message = fill(_api.message("MeshParameters")(), self.points.shape[1], parameters)
+        if self.message.HasField("surface") and not isinstance(self.bounds, Surface):
+            name = next(name for name in SURFACE_NUMBERS if name in parameters)
+            raise InvalidArgumentError(f"{name}: for triangles only; none are given", field=name)
         if "threads" not in parameters:
             self.message.threads = helpful_threads(self.points, parameters)
+
+    def _bounds_of(self, plane: dict[str, Any], surface: dict[str, Any], has_box: bool) -> Bounds | None:
+        """The bounds of the domain: in the plane or in space, as the points are."""
+        dimension = self.points.shape[1]
+        for kind, given, other in ((2, plane, surface), (3, surface, plane)):
+            name = next((name for name in given if name not in other), None)
+            if name is not None and dimension != kind:
+                raise InvalidArgumentError(
+                    f"{name}: for points in {kind}-D only; these are in {dimension}-D", field=name
+                )
+        if not plane and not surface:
+            return None
+        if dimension == 2:
+            return make_plane(plane, len(self.points), has_box)
+        name = next(iter(surface))  # both kinds have it
+        if "triangles" not in surface:
+            raise InvalidArgumentError(f"{name}: for segments or triangles only; none are given", field=name)
+        return make_surface(surface, len(self.points))
 
     def requests(self, boundary: bool) -> Iterator[bytes]:
         """Serialized requests of MeshPoints, and of EstimateMesh."""
@@ -251,8 +268,9 @@ class _Cloud:
                 yield _wire.message_field(6, chunk)
         for _, _, chunk in point_chunks(self.points):
             yield _wire.message_field(2, chunk)
-        if self.domain is not None:
-            for _, chunk in self.domain.segment_chunks():
-                yield _wire.message_field(4, chunk)
-            for _, chunk in self.domain.face_options():
-                yield _wire.message_field(5, chunk)
+        if self.bounds is not None:
+            rows, options = self.bounds.request_fields
+            for _, chunk in self.bounds.row_chunks():
+                yield _wire.message_field(rows, chunk)
+            for _, chunk in self.bounds.option_chunks():
+                yield _wire.message_field(options, chunk)

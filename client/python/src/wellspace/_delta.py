@@ -25,17 +25,17 @@ _CHANGED = {
     "simplex_regions": (15, 16, "<i4"),
 }
 # Those whose rows come by runs: the fields with these, and with the rows that are new.
-_KEPT = {"simplices": (6, 7), "facets": (17, 18)}
+_KEPT = {"simplices": (6, 7), "facets": (17, 18), "ridges": (19, 20)}
 _INDEX, _MOVED = 1, 10
 _TYPES = {field: dtype for _, field, dtype in _CHANGED.values()} | {field: "<u4" for _, field in _KEPT.values()}
 _LISTS = {field for field, _, _ in _CHANGED.values()} | {_MOVED}
 _RUNS = {field for field, _ in _KEPT.values()}
-# Large enough for all numbers of rows; so differences and sums of what comes do not overflow.
+# Large enough for all numbers of rows; so differences and sums of the numbers do not overflow.
 _MOST_ROWS = 2**40
 
 
 class DeltaReceiver:
-    """Takes for each difference its metadata, then its parts; with the last of them `mesh` is what it makes.
+    """Takes for each difference its metadata, then its parts; with the last of them `mesh` is the mesh after it.
 
     Errors say that the answer is damaged, or that the mesh is not the one that the server has had at its revision.
     """
@@ -230,6 +230,7 @@ def base_arrays(mesh: Mesh) -> dict[str, Array]:
         "vertex_tags": np.ascontiguousarray(mesh.vertex_tags, "<i4"),
         "simplex_regions": np.ascontiguousarray(mesh.regions, "<i4"),
         "facets": unsigned(mesh.facets),
+        "ridges": unsigned(mesh.ridges),
     }
 
 

@@ -1,212 +1,56 @@
-"""Segments between points in 2-D, and the faces that they bound."""
+"""The bounds of a domain, in the plane or in space: the common part of both kinds."""
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from collections.abc import Iterator, Mapping
-from typing import Any, TypedDict
+from collections.abc import Iterator
+from typing import Any, Protocol, TypedDict
 
-import numpy as np
-import numpy.typing as npt
-
-from . import _api, _wire
-from ._arrays import Floats, Indices, choice, coordinates, indices, number, whole_numbers
+from ._arrays import number
 from .errors import InvalidArgumentError
 
-# Segments and seeds of one message: about 256 KiB.
-_SEGMENTS_OF_A_REQUEST = 16_384
-_SEEDS_OF_A_REQUEST = 4_096
-
-_FACES = _api.enum_numbers("FaceRule")
-_CROSSINGS = _api.enum_numbers("CrossingRule")
-
-
-@dataclasses.dataclass(frozen=True)
-class RegionSeed:
-    """A point that stands for the face which it lies in; it becomes no vertex.
-
-    Parameters
-    ----------
-    x, y : float
-        In the unit of the points. Not on a segment.
-    region : int
-        The region of the triangles there, see `Mesh.regions`: the name is ``"region_7"`` for 7. 0: that of faces
-        without a seed.
-    max_area : float
-        No triangle there is larger. Above 0, in the unit of the points, squared. Default: no bound.
-    """
-
-    x: float
-    y: float
-    region: int = 0
-    max_area: float = math.inf
-
-
-@dataclasses.dataclass(frozen=True)
-class RegionPolygon:
-    """What stands for all faces inside of a polygon, whatever else cuts it.
-
-    Where polygons lie over each other, the one with the least area has the face; a `RegionSeed` comes before them.
-
-    Parameters
-    ----------
-    first, count : int
-        The rows of `segments` that are its rings: so many from the first on. Each ring is closed.
-    region : int
-        See `RegionSeed`.
-    max_area : float
-        See `RegionSeed`.
-    """
-
-    first: int
-    count: int
-    region: int = 0
-    max_area: float = math.inf
-
-
-@dataclasses.dataclass(frozen=True)
-class Domain:
-    """Segments, seeds and rules, checked; for messages."""
-
-    ends: Indices  # (m, 2)
-    markers: npt.NDArray[np.int32] | None  # (m,)
-    first_open: int  # segments from this one on are part of no ring
-    holes: Floats  # (k, 2)
-    regions: tuple[RegionSeed | RegionPolygon, ...]
-    faces: int
-    crossings: int
-    groups: npt.NDArray[np.uint32] | None  # (m,)
-    snap_distance: float | None
-
-    def segment_chunks(self) -> Iterator[tuple[int, bytes]]:
-        """Serialized SegmentChunks, and the number of the first segment of each."""
-        for begin, end, is_open in ((0, self.first_open, False), (self.first_open, len(self.ends), True)):
-            for first in range(begin, end, _SEGMENTS_OF_A_REQUEST):
-                last = min(first + _SEGMENTS_OF_A_REQUEST, end)
-                message = _api.message("SegmentChunk")(open=is_open)
-                if self.markers is not None:
-                    message.markers.extend(self.markers[first:last].tolist())
-                if self.groups is not None:
-                    message.groups.extend(self.groups[first:last].tolist())
-                yield first, _wire.packed_field(1, self.ends[first:last]) + message.SerializeToString()
-
-    def face_options(self, segments_before: int = 0) -> Iterator[tuple[int, bytes]]:
-        """Serialized FaceOptions, at least one, and the number of the first seed of each."""
-        seed = _api.message("FaceSeed")
-        seeds = [seed(x=x, y=y, hole=True) for x, y in self.holes.tolist()]
-        for r in self.regions:
-            bound = {} if math.isinf(r.max_area) else {"max_area": r.max_area}
-            seeds.append(seed(region=r.region, **bound))
-            if isinstance(r, RegionSeed):
-                seeds[-1].x, seeds[-1].y = r.x, r.y
-            else:
-                seeds[-1].polygon.first, seeds[-1].polygon.count = segments_before + r.first, r.count
-        for first in range(0, max(1, len(seeds)), _SEEDS_OF_A_REQUEST):
-            options = _api.message("FaceOptions")(faces=self.faces, crossings=self.crossings)
-            if self.snap_distance is not None:
-                options.snap_distance = self.snap_distance
-            options.seeds.extend(seeds[first : first + _SEEDS_OF_A_REQUEST])
-            yield first, options.SerializeToString()
+# Segments or triangles, and seeds, of one message: about 256 KiB.
+ROWS_OF_A_REQUEST = 16_384
+SEEDS_OF_A_REQUEST = 4_096
 
 
 class DomainArguments(TypedDict, total=False):
     """
-    segments : (m, 2) int
-        In 2-D: numbers of points. The mesh has each segment as a union of edges. Default: none.
     markers : (m,) int
-        A marker for each segment, which tells parts of the boundary apart: see `Mesh.facet_names`. Default: 0.
-    open_segments : (k, 2) int
-        Segments that are part of no ring: `faces` "even-odd" and "union" pass over them.
-    open_markers : (k,) int
-        Their markers.
-    holes : (h, 2) float
-        Points in faces that are not meshed.
-    regions : sequence of RegionSeed, RegionPolygon, or (x, y, region, max_area)
-        Points in faces that are a region of their own, or that have a largest area of triangles; or polygons of them.
-    faces : {"box", "holes", "even-odd", "union"}
-        Which faces, into which segments cut the plane, are meshed: all in the box; all bounded ones; those that an odd
-        number of segments separates from infinity; those of which that is so for the segments of at least one group.
-        Faces with a hole never are. Default "holes", with `box` "box".
-    groups : (m,) int
-        For `faces` "union": a number for each of `segments`, from 0 to 2**32 - 1, the same for those of one group, as a
-        feature of a map. Default: all are of one.
-    crossings : {"refuse", "snap", "split"}
-        What becomes of segments that cross, and of points too near to a segment. "refuse", the default: an error.
-        "snap": segments are led through such points. "split": also, and crossings become vertices.
-    snap_distance : float
-        With `crossings` "snap" and "split": segments are led through points nearer than this, too. In the unit of the
-        points. Default: what doubles cannot serve.
+        A marker for each of `segments`, or of `triangles`, which tells parts of the boundary apart: see
+        `Mesh.facet_names`. Default: 0.
+    holes : (h, d) float
+        Points in faces, or in solids, that are not meshed.
+    regions : sequence of RegionSeed, RegionPolygon, SolidSeed, or (x, y, region, max_area)
+        Points in faces, or in solids, that are a region of their own, or that have a largest simplex; or polygons of
+        faces. In 3-D (x, y, z, region, max_volume).
     """
 
-    segments: Any
     markers: Any
-    open_segments: Any
-    open_markers: Any
     holes: Any
     regions: Any
-    faces: str
-    crossings: str
-    groups: Any
-    snap_distance: float
 
 
-def make_domain(given: Mapping[str, Any], point_count: int | None = None, has_box: bool = False) -> Domain:
-    """Checks the DomainArguments that are given; `point_count` is None where points may come later."""
-    closed = indices(given.get("segments", []), "segments", 2, point_count)
-    opened = indices(given.get("open_segments", []), "open_segments", 2, point_count)
-    marked = None
-    if "markers" in given or "open_markers" in given:
-        parts = (("markers", len(closed)), ("open_markers", len(opened)))
-        marked = np.concatenate(
-            [whole_numbers(given.get(name, np.zeros(size, np.int32)), name, size) for name, size in parts]
-        )
-    rule = given.get("faces", "box" if has_box else "holes")
-    return Domain(
-        ends=np.concatenate([closed, opened]),
-        markers=marked,
-        first_open=len(closed),
-        holes=coordinates(given.get("holes", []), "holes", 2),
-        regions=tuple(_seed(one, f"regions[{row}]", len(closed)) for row, one in enumerate(given.get("regions", ()))),
-        faces=choice(rule, "faces", _FACES),
-        crossings=choice(given.get("crossings", "refuse"), "crossings", _CROSSINGS),
-        groups=_groups(given.get("groups"), len(closed), len(opened)),
-        snap_distance=_snap_distance(given),
-    )
+class Bounds(Protocol):
+    """The bounds of a domain, checked; for messages."""
+
+    request_fields: tuple[int, int]  # of MeshPointsRequest: the rows, and their options
+    method: str  # of SessionService
+    offset_field: str  # of its request
+    count_field: str  # of Session
+
+    @property
+    def row_count(self) -> int:
+        """How many segments or triangles."""
+
+    def row_chunks(self) -> Iterator[tuple[int, bytes]]:
+        """Serialized chunks of rows, and the number of the first row of each."""
+
+    def option_chunks(self, rows_before: int = 0) -> Iterator[tuple[int, bytes]]:
+        """Serialized options, at least one, and the number of the first seed of each."""
 
 
-def _groups(given: Any, closed: int, opened: int) -> npt.NDArray[np.uint32] | None:
-    """A group for each segment; open ones, which are of none, come last."""
-    if given is None:
-        return None
-    numbers = np.asarray(given)
-    if numbers.shape != (closed,) or not (np.issubdtype(numbers.dtype, np.integer) or numbers.size == 0):
-        raise InvalidArgumentError(
-            f"groups has shape {numbers.shape} and type {numbers.dtype}; expected {closed} whole numbers, one for each "
-            "of segments",
-            field="groups",
-        )
-    outside = np.flatnonzero((numbers < 0) | (numbers >= 2**32))
-    if outside.size:
-        raise InvalidArgumentError(
-            f"groups[{outside[0]}] is {numbers[outside[0]]}; expected a whole number from 0 to {2**32 - 1}",
-            field="groups",
-        )
-    return np.concatenate([numbers.astype(np.uint32), np.zeros(opened, np.uint32)])
-
-
-def _snap_distance(given: Mapping[str, Any]) -> float | None:
-    if given.get("snap_distance") is None:
-        return None
-    distance = number(given["snap_distance"], "snap_distance")
-    if not 0 <= distance < math.inf:
-        raise InvalidArgumentError(
-            f"snap_distance is {distance}; expected a finite number of at least 0", field="snap_distance"
-        )
-    return distance
-
-
-def _whole(value: Any, name: str, what: str, low: int, high: int) -> int:
+def whole(value: Any, name: str, what: str, low: int, high: int) -> int:
     """A whole number from `low` to below `high`."""
     if number(value, name) != int(number(value, name)) or not low <= value < high:
         raise InvalidArgumentError(
@@ -215,31 +59,23 @@ def _whole(value: Any, name: str, what: str, low: int, high: int) -> int:
     return int(value)
 
 
-def _area(value: Any, name: str) -> float:
-    """A largest area; infinite for none."""
+def region_of(value: Any, name: str) -> int:
+    """The number of a region."""
+    return whole(value, name, "region", -(2**31), 2**31)
+
+
+def bound_of(value: Any, name: str, what: str) -> float:
+    """A largest area, or volume; infinite for none."""
     if not number(value, name) > 0:
         raise InvalidArgumentError(
-            f"{name} has the max_area {value!r}; expected a number above 0, or nothing for no bound", field=name
+            f"{name} has the {what} {value!r}; expected a number above 0, or nothing for no bound", field=name
         )
     return number(value, name)
 
 
-def _polygon(given: RegionPolygon, name: str, segments: int) -> RegionPolygon:
-    first = _whole(given.first, name, "first segment", 0, max(segments, 1))
-    count = _whole(given.count, name, "count of segments", 1, max(segments - first + 1, 2))
-    region = _whole(given.region, name, "region", -(2**31), 2**31)
-    return RegionPolygon(first, count, region, _area(given.max_area, name))
-
-
-def _seed(value: Any, name: str, segments: int) -> RegionSeed | RegionPolygon:
-    """A RegionPolygon of so many segments, a RegionSeed, or (x, y[, region[, max_area]])."""
-    if isinstance(value, RegionPolygon):
-        return _polygon(value, name, segments)
-    if isinstance(value, RegionSeed):
-        value = dataclasses.astuple(value)
-    row = list(value) if isinstance(value, (tuple, list, np.ndarray)) else []
-    if not 2 <= len(row) <= 4:
-        raise InvalidArgumentError(f"{name} is {value!r}; expected (x, y, region, max_area)", field=name)
-    x, y, region, max_area = (*row, 0, math.inf)[:4] if len(row) < 3 else (*row, math.inf)[:4]
-    place = coordinates([[x, y]], name, 2)[0].tolist()
-    return RegionSeed(place[0], place[1], _whole(region, name, "region", -(2**31), 2**31), _area(max_area, name))
+def length_of(value: Any, name: str) -> float:
+    """A finite length of at least 0."""
+    length = number(value, name)
+    if not 0 <= length < math.inf:
+        raise InvalidArgumentError(f"{name} is {length}; expected a finite number of at least 0", field=name)
+    return length

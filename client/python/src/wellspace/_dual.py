@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ._arrays import Floats
+from ._mesh_arrays import MeshArrays
 from .errors import InvalidArgumentError
-
-if TYPE_CHECKING:
-    from ._mesh import Mesh
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,7 +33,7 @@ class DualCells:
         Of the edges.
     facet_areas : (f, d) float
         For each of `Mesh.facets` its part of the area that the cells of its vertices have on the boundary. Of obtuse
-        triangles it may be negative; what a vertex has in all of its facets is not. Empty if the mesh was asked for
+        triangles it may be negative; the sum over all facets of a vertex is not. Empty if the mesh was asked for
         without the boundary.
     """
 
@@ -46,7 +44,7 @@ class DualCells:
     facet_areas: Floats
 
 
-def dual_cells(mesh: Mesh) -> DualCells:
+def dual_cells(mesh: MeshArrays) -> DualCells:
     """See `Mesh.dual_cells`."""
     if mesh.dimension not in (2, 3):
         raise InvalidArgumentError(f"dual cells are for 2-D and 3-D; the mesh is in {mesh.dimension}-D", field="mesh")
@@ -96,7 +94,7 @@ def _part(corners: Floats, i: int, j: int) -> Floats:
 
 
 def _height(corners: Floats, face: tuple[int, int, int], opposite: int) -> Floats:
-    """How far the circumcentre of a tetrahedron is from a face; negative beyond it, seen from the opposite corner."""
+    """The distance of a tetrahedron's circumcentre from a face; negative beyond it, seen from the opposite corner."""
     a, b, c = (corners[:, k] - corners[:, face[0]] for k in (face[1], face[2], opposite))
     normal = np.cross(a, b)
     aa, bb, cc = _dot(a, a), _dot(b, b), _dot(c, c)

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import importlib
 import os
 import pathlib
 import tempfile
 import zipfile
 from collections.abc import Iterator
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
 
 import numpy as np
 
+from . import _tool
+from ._mesh_arrays import MeshArrays
 from .errors import InvalidArgumentError, MissingPackageError
-
-if TYPE_CHECKING:
-    from ._mesh import Mesh
 
 # By the dimension: the simplices and the facets of meshio.
 _CELLS = {2: ("triangle", "line"), 3: ("tetra", "triangle")}
@@ -25,11 +25,19 @@ _VTK_TRIANGLE, _VTK_TETRA = 5, 10
 _REALS = {"points", "weights"}
 
 
-def save(mesh: Mesh, path: str | os.PathLike[str], options: dict[str, Any]) -> None:
+def save(mesh: MeshArrays, path: str | os.PathLike[str], options: dict[str, Any]) -> None:
     """See Mesh.save. A file that cannot be written to its end is not there."""
     target = pathlib.Path(path)
     if target.suffix != ".npz":
-        write = _package("meshio", f"to write {target.suffix or 'files without an extension'}").write
+        is_of_tool = target.suffix in _tool.MESH_FORMATS
+        if is_of_tool and not options and _tool.find() is not None:
+            with tempfile.TemporaryDirectory(prefix="wellspace-") as folder:
+                source = pathlib.Path(folder) / "mesh.npz"
+                save(mesh, source, {})
+                _tool.convert(source, target)
+            return
+        purpose = f"to write {target.suffix or 'files without an extension'}"
+        write = _package("meshio", f"or the tool wellspace on the path, {purpose}" if is_of_tool else purpose).write
         converted = to_meshio(mesh)
         if target.suffix == ".msh":  # of Gmsh, 2.2: meshio takes it for one of ANSYS, and has no entities for 4.1
             options = {"file_format": "gmsh22", **options}
@@ -59,7 +67,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
         raise
 
 
-def _members(mesh: Mesh) -> dict[str, Any]:
+def _members(mesh: MeshArrays) -> dict[str, Any]:
     """The arrays of the file: client/formats/numpy/npz.h has their names."""
     members: dict[str, Any] = {"points": mesh.points}
     if mesh.weights is not None:
@@ -70,6 +78,8 @@ def _members(mesh: Mesh) -> dict[str, Any]:
         members["vertex_tags"] = mesh.vertex_tags
         members["facets"] = mesh.facets.astype(np.uint32, copy=False)
         members["facet_tags"] = mesh.facet_tags
+        if len(mesh.ridges):
+            members["ridges"] = mesh.ridges.astype(np.uint32, copy=False)
         members["facet_names"] = np.array(list(mesh.facet_names.values()), "U")
         members["facet_name_tags"] = np.array(list(mesh.facet_names), np.int32)
     if mesh.region_names:
@@ -80,7 +90,14 @@ def _members(mesh: Mesh) -> dict[str, Any]:
 
 
 def load(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """The attributes of a Mesh from a .npz."""
+    """See Mesh.load: the attributes of the mesh."""
+    if pathlib.Path(path).suffix != ".npz":
+        if not os.path.exists(path):
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), os.fspath(path))
+        with tempfile.TemporaryDirectory(prefix="wellspace-") as folder:
+            arrays = pathlib.Path(folder) / "mesh.npz"
+            _tool.convert(path, arrays)
+            return load(arrays)
     try:
         with np.load(path, allow_pickle=False) as archive:
             found = {name: archive[name] for name in archive.files}
@@ -102,6 +119,7 @@ def load(path: str | os.PathLike[str]) -> dict[str, Any]:
         "input_vertices": none,
         "facets": found.get("facets", none.reshape(0, d)).astype(kind),
         "facet_tags": found.get("facet_tags", none),
+        "ridges": found.get("ridges", none.reshape(0, 2)).astype(kind),
         "facet_names": dict(zip(found.get("facet_name_tags", none).tolist(), found.get("facet_names", none).tolist())),
         "regions": regions,
         "region_names": dict(zip(ids, names)),
@@ -134,6 +152,7 @@ def _checked(found: dict[str, Any], path: Any) -> tuple[Any, Any]:
         raise wrong(f"simplices of {simplices.shape[1]} vertices in {d}-D")
     m, f = len(simplices), len(found.get("facets", ()))
     shapes = {"points": (n, d), "weights": (n,), "simplices": (m, d + 1), "facets": (f, d), "facet_tags": (f,),
+              "ridges": (len(found.get("ridges", ())), 2),
               "vertex_origins": (n,), "vertex_tags": (n,), "regions": (m,),
               "facet_name_tags": (len(found.get("facet_names", ())),),
               "region_ids": (len(found.get("region_names", ())),)}
@@ -147,7 +166,7 @@ def _checked(found: dict[str, Any], path: Any) -> tuple[Any, Any]:
             raise wrong(f"{name} is of {array.dtype}; expected {'numbers' if name in _REALS else 'whole numbers'}")
         bad = ~np.isfinite(array) if name in _REALS else np.zeros(shape, bool)
         expected = "a finite number"
-        if name in ("simplices", "facets"):
+        if name in ("simplices", "facets", "ridges"):
             bad, expected = (array < 0) | (array >= n), f"a vertex from 0, below {n}"
         elif name == "facet_tags" and "facet_name_tags" in found:
             bad, expected = ~np.isin(array, found["facet_name_tags"]), "a tag that has a name"
@@ -167,7 +186,7 @@ def _region_name(number: int) -> str:
     return "domain" if number == 1 else f"region_{number}"
 
 
-def to_meshio(mesh: Mesh) -> Any:
+def to_meshio(mesh: MeshArrays) -> Any:
     """See Mesh.to_meshio."""
     meshio = _package("meshio", "for to_meshio")
     simplex, facet = _cells_of(mesh)
@@ -188,7 +207,7 @@ def to_meshio(mesh: Mesh) -> Any:
     return meshio.Mesh(points, cells, point_data=point_data, cell_data=data, field_data=names)
 
 
-def to_pyvista(mesh: Mesh) -> Any:
+def to_pyvista(mesh: MeshArrays) -> Any:
     """See Mesh.to_pyvista."""
     pyvista = _package("pyvista", "for to_pyvista")
     _cells_of(mesh)
@@ -208,14 +227,14 @@ def to_pyvista(mesh: Mesh) -> Any:
     return grid
 
 
-def _spatial(mesh: Mesh) -> Any:
+def _spatial(mesh: MeshArrays) -> Any:
     """The vertices with three coordinates."""
     if mesh.dimension == 3:
         return mesh.points
     return np.column_stack([mesh.points, np.zeros(len(mesh.points))])
 
 
-def _cells_of(mesh: Mesh) -> tuple[str, str]:
+def _cells_of(mesh: MeshArrays) -> tuple[str, str]:
     if mesh.dimension not in _CELLS:
         raise InvalidArgumentError(
             f"a mesh in {mesh.dimension}-D; meshio and pyvista have 2-D and 3-D, save takes .npz", field="mesh"

@@ -23,7 +23,7 @@ _NONE = 2**32 - 1
 
 @dataclasses.dataclass(frozen=True)
 class Located:
-    """Where n points lie in a mesh.
+    """The places of n points in a mesh.
 
     Attributes
     ----------

@@ -12,17 +12,18 @@ import numpy.typing as npt
 
 from . import _dual, _files, _view
 from ._dual import DualCells
+from ._mesh_arrays import MeshArrays
 from ._receiver import MeshReceiver
 from ._view import Plot
 from .errors import InvalidArgumentError
-from .statistics import Statistics, statistics_of
+from .statistics import statistics_of
 
 # Of Mesh.vertex_origins, where the number of an input point does not stand.
 STEINER, REPAIR, CORNER = -1, -2, -3
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Mesh:
+class Mesh(MeshArrays):
     """A simplicial mesh of n vertices and m simplices in d dimensions.
 
     All numbers of vertices count from 0. Arrays of them are of int32, or of int64 where that is too small. Lengths are
@@ -35,7 +36,8 @@ class Mesh:
     simplices : (m, d + 1) int
         Triangles in 2-D, tetrahedra in 3-D, and so on, each positively oriented.
     input_vertices : (p,) int
-        For each input point the vertex that it became; -1 for one that lies in no face which is meshed.
+        For each input point the vertex that it became; -1 for one that lies in no face, or solid, which is meshed, and
+        for most corners of triangles.
     facets : (f, d) int
         The facets of the boundary, edges in 2-D and triangles in 3-D. They look outward: in 2-D the mesh is on the left
         of an edge, in 3-D a triangle is counterclockwise seen from outside.
@@ -43,11 +45,13 @@ class Mesh:
         The tag of each facet, above 0.
     facet_names : dict of int to str
         The name of each tag: ``"xmin"``, ``"xmax"``, ``"ymin"`` … of the box, ``"marker_7"`` or ``"unmarked"`` of
-        segments.
+        segments and triangles.
+    ridges : (r, 2) int
+        Of a surface: the edges on its creases.
     regions : (m,) int32
         The region of each simplex.
     region_names : dict of int to str
-        The name of each region: ``"domain"``, or ``"region_7"`` for the region 7 of a `RegionSeed`.
+        The name of each region: ``"domain"``, or ``"region_7"`` for the region 7 of a `RegionSeed` or `SolidSeed`.
     vertex_origins : (n,) int
         Where each vertex comes from: the number of the first input point that became it, or -1: the refinement, -2: the
         repair of slivers, -3: it is a corner of the box.
@@ -58,36 +62,15 @@ class Mesh:
     moved_vertices : (k,) int
         In a session: vertices that its last mesh had at another place. Ascending.
     box : (2, d) float64
-        Low and high corner of the box that the simplices decompose; of a domain with segments the bounding box of what
-        is meshed.
+        Low and high corner of the box that the simplices decompose; of a domain with segments or triangles the
+        bounding box of the meshed part.
     statistics : Statistics or None
         Figures of the mesh and of the run that made it; None for a mesh from a file.
     revision : int
         Of the session's mesh; 0 for others.
 
-    What is about the boundary, from `facets` to `vertex_tags`, is empty if the mesh was asked for without it.
+    The arrays about the boundary, from `facets` to `vertex_tags`, are empty if the mesh was asked for without it.
     """
-
-    points: npt.NDArray[np.float64]
-    simplices: npt.NDArray[Any]
-    input_vertices: npt.NDArray[Any]
-    facets: npt.NDArray[Any]
-    facet_tags: npt.NDArray[np.int32]
-    facet_names: dict[int, str]
-    regions: npt.NDArray[np.int32]
-    region_names: dict[int, str]
-    vertex_origins: npt.NDArray[Any]
-    vertex_tags: npt.NDArray[np.int32]
-    weights: npt.NDArray[np.float64] | None
-    moved_vertices: npt.NDArray[Any]
-    box: npt.NDArray[np.float64]
-    statistics: Statistics | None = None
-    revision: int = 0
-
-    @property
-    def dimension(self) -> int:
-        """Of the space: d."""
-        return int(self.points.shape[1])
 
     def __repr__(self) -> str:
         return f"<wellspace.Mesh: {len(self.points)} vertices, {len(self.simplices)} simplices in {self.dimension}-D>"
@@ -126,14 +109,33 @@ class Mesh:
     def save(self, path: str | os.PathLike[str], **options: Any) -> None:
         """Writes the mesh to a file; the extension says in which format.
 
-        ``.npz`` is written as the tool `wellspace` does: ``wellspace check`` reads it. All other formats are those of
-        `meshio.write`, which gets `options`, and are for 2-D and 3-D.
+        ``.npz`` needs nothing else. ``.vtu``, ``.vtkhdf``, ``.vtk``, ``.xdmf``, ``.msh``, ``.mesh``, ``.su2``,
+        ``.inp``, ``.node``, ``.14`` and ``.2dm`` are written by the tool `wellspace`, on the path or named by
+        ``$WELLSPACE_TOOL_BINARY``: the bytes of ``wellspace convert``, with names of parts and regions.
+        Other formats, those without the tool, and all with `options`, are those of `meshio.write`, in 2-D and 3-D.
+
+        Raises
+        ------
+        InvalidArgumentError
+            The format does not have such a mesh.
+        MissingPackageError
+            Neither the tool nor meshio is installed.
+        OSError
+            The file cannot be written; then it is not there.
         """
         _files.save(self, path, options)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Mesh:
-        """Reads a ``.npz`` of `save`, or of the tool `wellspace`."""
+        """Reads a mesh from a file: a ``.npz`` by itself, others that ``wellspace convert`` reads by the tool.
+
+        Raises
+        ------
+        InvalidArgumentError
+            The file is not a mesh of that format; with the place.
+        MissingPackageError
+            The tool is not installed, and is needed.
+        """
         return cls(**_files.load(path))
 
     def to_meshio(self) -> Any:
@@ -158,7 +160,7 @@ class Mesh:
         Parameters
         ----------
         name : str
-            What the page calls the mesh.
+            The mesh's name on the page.
         up : str
             The axis that points upwards at first: ``"x"``, ``"y"`` or ``"z"``.
         data : dict of str to (n,) array
@@ -217,4 +219,5 @@ def mesh_from(m: Any, arrays: dict[str, npt.NDArray[Any]], moved: npt.NDArray[np
         box=np.array([list(m.domain.low), list(m.domain.high)]),
         statistics=statistics_of(m.statistics),
         revision=m.revision,
+        ridges=signed(arrays["ridges"], n).reshape(-1, 2),
     )

@@ -1,4 +1,4 @@
-"""Streams of messages with points and meshes: what several calls send, and what they do with what comes."""
+"""Streams of messages with points and meshes: those that several calls send, and receive."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What to mesh, and how well: MeshParameters of the service, with the names of this package."""
+"""The domain of a mesh and its quality: MeshParameters of the service, with the names of this package."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _CRITERIA = _api.enum_numbers("Criterion")
 class Parameters(TypedDict, total=False):
     """
     criterion : {"radius-edge", "well-spaced"}
-        What `rho` bounds: circumradius / shortest edge of every simplex; or, for every vertex, the farthest node of its
+        `rho` bounds circumradius / shortest edge of every simplex; or, for every vertex, the farthest node of its
         Voronoi cell / its nearest neighbour, which is stronger and takes about 2.5 times as many vertices. Default
         "radius-edge".
     rho : float
@@ -48,8 +48,27 @@ class Parameters(TypedDict, total=False):
         Default: 1 from boxes, 0.3 from points.
     min_dihedral : float
         In 3-D, no dihedral angle of a tetrahedron is smaller: vertices are moved, and some added, until that holds.
-        What cannot be repaired is counted in ``statistics.slivers.left``. Degrees, from 0 to 18; 0 turns it off.
+        Slivers left over are counted in ``statistics.slivers.left``. Degrees, from 0 to 18; 0 turns it off.
         Default: 12 in 3-D, 0 elsewhere.
+    tolerance : float
+        Of a surface: facets and the surface are nowhere farther apart, in either direction. Above 0, in the unit of the
+        points. Default: 1e-3 of the diagonal of the surface's bounding box; with ``solids="winding"`` `resolution`.
+    facet_length : float
+        Of a surface: edges on it have this length, on average where nothing asks for shorter ones. Above 0, in the unit
+        of the points. Default: no bound.
+    min_facet_angle : float
+        Of a surface: no facet on it has a smaller angle, but where the surface itself has. Degrees, from 0, which turns
+        it off, to 30. Default 25.
+    min_size : float
+        Of a surface: nothing is added to it for its shape, or for `tolerance`, nearer to another vertex than this.
+        Above 0, in the unit of the points. Default: half of `tolerance`.
+    per_circle : float
+        Of a surface: where it is curved, edges are so short that this many would go round a circle of its radius of
+        curvature; from there sizes grow by `gradation`. Above 0. Not for scans, whose noise is curvature. Default:
+        none.
+    layers : float
+        Of a surface: where a solid is thin, edges are so short that this many go across it; from there sizes grow by
+        `gradation`. Above 0. Default: none.
     pump_weights : bool
         From 3-D on: give vertices weights, under which the worst simplices are best. The mesh is then the regular
         triangulation of its vertices with `Mesh.weights`, and `rho` does not hold. Default False.
@@ -66,7 +85,7 @@ class Parameters(TypedDict, total=False):
         By how much that is grown on every side: a part of its longest side, at least 0. Not used with `box`. Default
         0.25.
     max_vertices : int
-        Fail with `LimitError` before the mesh has more vertices. Default: what the server allows, but not above 50
+        Fail with `LimitError` before the mesh has more vertices. Default: the limit of the server, but not above 50
         million.
     threads : int
         Threads that mesh; the server takes fewer if it has fewer. The mesh does not depend on it. Default: as many as
@@ -81,6 +100,12 @@ class Parameters(TypedDict, total=False):
     edge_length: float
     gradation: float
     min_dihedral: float
+    tolerance: float
+    facet_length: float
+    min_facet_angle: float
+    min_size: float
+    per_circle: float
+    layers: float
     pump_weights: bool
     merge_distance: float
     keep_vertices: bool
@@ -90,7 +115,7 @@ class Parameters(TypedDict, total=False):
     threads: int
 
 
-# Those of the service that a number sets as it is.
+# The parameters of the service that a number sets as it is.
 _NUMBERS = {
     "rho": "rho",
     "size": "max_circumradius",
@@ -102,8 +127,19 @@ _NUMBERS = {
 }
 
 
+# The same, of SurfaceParameters.
+SURFACE_NUMBERS = {
+    "tolerance": "tolerance",
+    "facet_length": "edge_length",
+    "min_facet_angle": "min_facet_angle",
+    "min_size": "min_size",
+    "per_circle": "curvature_elements",
+    "layers": "thickness_layers",
+}
+
+
 # Of these infinity stands for none.
-_BOUNDS = {"size", "edge_length"}
+_BOUNDS = {"size", "edge_length", "facet_length"}
 
 
 def takes(*kinds: Any) -> Callable[[Function], Function]:
@@ -112,10 +148,10 @@ def takes(*kinds: Any) -> Callable[[Function], Function]:
     def change(function: Function) -> Function:
         signature = inspect.signature(function)
         own = [p for p in signature.parameters.values() if p.kind is not inspect.Parameter.VAR_KEYWORD]
+        annotations = {name: annotation for kind in kinds for name, annotation in kind.__annotations__.items()}
         named = [
             inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=_text(annotation))
-            for kind in kinds
-            for name, annotation in kind.__annotations__.items()
+            for name, annotation in annotations.items()
         ]
         function.__signature__ = signature.replace(parameters=[*own, *named])  # type: ignore[attr-defined]
         function.__doc__ = naming(function.__doc__, *kinds)
@@ -146,13 +182,9 @@ def split(function: str, arguments: Mapping[str, Any], *kinds: Any) -> list[dict
 def fill(message: Any, dimension: int, given: Mapping[str, Any]) -> Any:
     """Sets the fields of a MeshParameters that `given` names; `split` has checked the names."""
     message.dimension = count(dimension, "dimension", 2**31 - 1)
-    for name, field in _NUMBERS.items():
-        if name in given:
-            value = number(given[name], name)
-            if name in _BOUNDS and value == math.inf:
-                message.ClearField(field)
-            else:
-                setattr(message, field, value)  # 0, too: the service refuses it where it can be no value
+    _set_numbers(message, _NUMBERS, given)
+    if any(name in given for name in SURFACE_NUMBERS):
+        _set_numbers(message.surface, SURFACE_NUMBERS, given)
     for name in ("pump_weights", "keep_vertices"):
         if name in given:
             setattr(message, name, bool(given[name]))
@@ -176,6 +208,16 @@ def fill(message: Any, dimension: int, given: Mapping[str, Any]) -> Any:
         for row, one in enumerate(given["size_boxes"]):
             _add_size_box(message.size_boxes.add(), one, dimension, f"size_boxes[{row}]")
     return message
+
+
+def _set_numbers(message: Any, fields: Mapping[str, str], given: Mapping[str, Any]) -> None:
+    for name, field in fields.items():
+        if name in given:
+            value = number(given[name], name)
+            if name in _BOUNDS and value == math.inf:
+                message.ClearField(field)
+            else:
+                setattr(message, field, value)  # 0, too: the service refuses it where it can be no value
 
 
 def rho_of_angle(degrees: float, dimension: int) -> float:
@@ -231,11 +273,12 @@ def _criterion_names() -> dict[int, str]:
 
 
 def read(message: Any) -> dict[str, Any]:
-    """A MeshParameters by the names of this package; what is not set is left out."""
+    """A MeshParameters by the names of this package; unset fields are left out."""
     found: dict[str, Any] = {}
-    for name, field in _NUMBERS.items():
-        if message.HasField(field):
-            found[name] = getattr(message, field)
+    for part, fields in ((message, _NUMBERS), (message.surface, SURFACE_NUMBERS)):
+        for name, field in fields.items():
+            if part.HasField(field):
+                found[name] = getattr(part, field)
     found["criterion"] = _criterion_names().get(message.criterion, "radius-edge")
     for name in ("pump_weights", "keep_vertices", "max_vertices", "threads"):
         if getattr(message, name):

@@ -1,10 +1,12 @@
-"""How far a call is, told to a function or shown as a bar."""
+"""The progress of a call, told to a function or shown as a bar."""
 
 from __future__ import annotations
 
 import contextlib
 import dataclasses
+import html
 import sys
+import time
 from collections.abc import Callable, Iterator
 from typing import Any, Union
 
@@ -15,7 +17,7 @@ _STEPS = 1000  # of a bar
 
 @dataclasses.dataclass(frozen=True)
 class Progress:
-    """How far meshing is.
+    """The progress of meshing.
 
     Attributes
     ----------
@@ -69,7 +71,10 @@ def told(option: ProgressOption) -> Iterator[OnProgress]:
         yield lambda progress: None
 
 
-def _make_bar() -> _TqdmBar | _TextBar:
+def _make_bar() -> _NotebookBar | _TqdmBar | _TextBar:
+    display = _notebook_display()
+    if display is not None:
+        return _NotebookBar(display)
     try:
         from tqdm.auto import tqdm
     except ImportError:
@@ -105,3 +110,63 @@ class _TextBar:
     def close(self) -> None:
         if self._width:
             print(file=sys.stderr)
+
+
+def _notebook_display() -> Callable[..., Any] | None:
+    """IPython's `display` where this code runs in the kernel of a notebook; an unloaded module is not imported."""
+    if "IPython" not in sys.modules:
+        return None
+    try:
+        from IPython import get_ipython
+        from IPython.display import display
+    except ImportError:
+        return None
+    shell = get_ipython()
+    found: Callable[..., Any] = display
+    return found if getattr(shell, "kernel", None) is not None else None
+
+
+class _NotebookBar:
+    """A bar below the cell, by IPython's protocol of display alone: Jupyter, VS Code and Colab show it."""
+
+    def __init__(self, display: Callable[..., Any]) -> None:
+        self._display = display
+        self._handle: Any = None
+        self._first: tuple[float, float] | None = None  # fraction and time of the first work
+        self._html = ""
+
+    def update(self, progress: Progress) -> None:
+        left = self._time_left(progress.fraction, time.monotonic())
+        text = f"{progress.phase}: {progress.fraction:.0%}, {progress.vertices:,} vertices"
+        text += "" if left is None else f", {left:.0f} s left"
+        self._show(
+            f'<progress max="1" value="{progress.fraction:.4f}" style="width:20em;vertical-align:middle"></progress> '
+            f"{html.escape(text)}"
+        )
+
+    def close(self) -> None:
+        """Leaves the last line there, without a bar."""
+        if self._handle is not None:
+            self._show(self._html.rpartition("</progress> ")[2])
+
+    def _repr_html_(self) -> str:
+        return self._html
+
+    def __repr__(self) -> str:
+        return "progress"
+
+    def _show(self, text: str) -> None:
+        self._html = text
+        if self._handle is None:
+            self._handle = self._display(self, display_id=True)
+        else:
+            self._handle.update(self)
+
+    def _time_left(self, fraction: float, now: float) -> float | None:
+        """Seconds, at the mean speed since the first work; nothing before two seconds and two percent of it."""
+        if not 0 < fraction < 1:
+            return None
+        if self._first is None:
+            self._first = fraction, now
+        done, taken = fraction - self._first[0], now - self._first[1]
+        return None if done < 0.02 or taken < 2 else taken * (1 - fraction) / done

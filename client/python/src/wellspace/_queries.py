@@ -1,8 +1,9 @@
-"""Queries about vertices of a session, which answer in streams."""
+"""Queries about vertices of a session, which answer in streams; vertices that are added."""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -10,14 +11,16 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _api, _wire
-from ._arrays import Indices
+from ._arrays import Floats, Indices
 from ._calls import Calls, CallOptions
 from ._cells import CellReader
+from ._mesh import signed
 from ._receiver import damaged
 from ._retry import Attempt, now
 from .errors import Error
 
 _VERTICES_OF_A_REQUEST = 1 << 17  # which then has half a MiB
+_BYTES_OF_AN_ADDITION = 3 << 20  # of points, in one request: three quarters of a server's limit
 
 
 def stream_answers(
@@ -84,3 +87,50 @@ def stream_cells(
         method = "QueryService/ClippedVoronoiCells"
         head = _api.message("ClippedVoronoiCellsRequest")(name=session, beta=beta)
     stream_answers(calls, method, head.SerializeToString(), vertices, reader.add, options)
+
+
+def add_vertices(
+    calls: Calls, session: str, cloud: Floats, near: Indices, expected_revision: int | None, options: CallOptions
+) -> npt.NDArray[Any]:
+    """Adds vertices at the points, in as many requests as they take; returns their numbers."""
+    most = _BYTES_OF_AN_ADDITION // (8 * cloud.shape[1] + 4)
+    deadline = math.inf if options.timeout is None else now() + options.timeout
+    request_id = options.id_or_new()
+    vertices = np.empty(len(cloud), np.uint32)
+    head = _api.message("AddVerticesRequest")(name=session, expected_revision=expected_revision)
+    for begin in range(0, max(1, len(cloud)), most):
+        part = slice(begin, min(len(cloud), begin + most))
+        head.request_id = f"{request_id}/{begin}" if begin else request_id
+        request = head.SerializeToString() + _wire.packed_field(2, cloud[part]) + _wire.packed_field(3, near[part])
+        left = None if math.isinf(deadline) else max(0.0, deadline - now())
+        try:
+            answer = calls.unary_bytes("QueryService/AddVertices", request, CallOptions(left, options.cancel))
+        except Error as error:
+            if not begin:
+                raise
+            raise _after_others(error, begin, len(cloud)) from None
+        found, revision = _added(answer)
+        if len(found) != part.stop - begin:
+            raise damaged(f"{len(found)} vertices for {part.stop - begin} points")
+        vertices[part] = found
+        if head.HasField("expected_revision"):
+            head.expected_revision = revision
+    return signed(vertices, int(vertices.max(initial=0)) + 1)
+
+
+def _added(answer: bytes) -> tuple[npt.NDArray[Any], int]:
+    """The vertices and the revision of an AddVerticesResponse."""
+    parts: list[npt.NDArray[Any]] = [np.empty(0, np.uint32)]
+    revision = 0
+    for field in _wire.fields(memoryview(answer)):
+        if field.number == 1:
+            parts.append(_wire.packed(field, "<u4"))
+        elif field.number == 2:
+            revision = int(field.value)
+    return np.concatenate(parts), revision
+
+
+def _after_others(error: Error, added: int, count: int) -> Error:
+    """`error` of a request behind others: its points are counted from the first of the call."""
+    message = re.sub(r"\b(points|near)\[(\d+)", lambda found: f"{found[1]}[{int(found[2]) + added}", error.message)
+    return error.with_message(f"{message}; the first {added} of {count} points were added before")

@@ -45,6 +45,7 @@ _ARRAYS = (
     _Array("simplices", 4, "<u4"),
     _Array("input_vertices", 5, "<u4"),
     _Array("facets", 11, "<u4"),
+    _Array("ridges", 12, "<u4"),
 )
 _PLACES = {array.field: place for place, array in enumerate(_ARRAYS)}
 _INDEX, _CRC, _MOVED = 1, 2, 7  # other fields of MeshChunk
@@ -61,7 +62,7 @@ class MeshReceiver:
     Parameters
     ----------
     dimension, input_points : int or None
-        What the mesh is known to be.
+        The known properties of the mesh.
     """
 
     def __init__(self, dimension: int | None = None, input_points: int | None = None) -> None:
@@ -199,17 +200,18 @@ def sizes_of(m: Any) -> dict[str, int]:
         "simplices": m.simplex_count * (m.dimension + 1),
         "input_vertices": m.input_point_count,
         "facets": m.facet_count * m.dimension,
+        "ridges": m.ridge_count * 2,
     }
 
 
 def widths_of(m: Any) -> dict[str, int]:
     """How many numbers their rows have."""
-    wide = {"points": m.dimension, "simplices": m.dimension + 1, "facets": m.dimension}
+    wide = {"points": m.dimension, "simplices": m.dimension + 1, "facets": m.dimension, "ridges": 2}
     return {array.name: wide.get(array.name, 1) for array in _ARRAYS}
 
 
 def check_metadata(m: Any, dimension: int | None, input_points: int | None) -> None:
-    """Whether there can be such a mesh, of what it is known to be."""
+    """Raises an error unless there can be such a mesh, by its known properties."""
     if (
         not 1 <= m.dimension <= MAX_DIMENSION
         or dimension not in (None, m.dimension)
@@ -219,7 +221,7 @@ def check_metadata(m: Any, dimension: int | None, input_points: int | None) -> N
                       f"{len(m.domain.high)} high coordinates; expected {dimension or 'one dimension'}")
     if (
         m.vertex_count > _MAX_VERTICES
-        or max(m.simplex_count, m.input_point_count, m.facet_count) > _MAX_SIMPLICES
+        or max(m.simplex_count, m.input_point_count, m.facet_count, m.ridge_count) > _MAX_SIMPLICES
     ):
         raise damaged(f"{m.vertex_count} vertices, {m.simplex_count} simplices, {m.facet_count} facets and "
                       f"{m.input_point_count} points are more than can be")
@@ -240,7 +242,7 @@ def check_values(m: Any, name: str, values: npt.NDArray[Any]) -> None:
         wrong = values[~np.isfinite(values) | ((values < 0) if name == "weights" else False)]
         if len(wrong):
             raise damaged(f"{name} have the number {wrong[0]}")
-    elif name in ("simplices", "facets"):
+    elif name in ("simplices", "facets", "ridges"):
         if values.max() >= m.vertex_count:
             raise damaged(f"{name} name vertex {values.max()} of {m.vertex_count}")
     elif name == "input_vertices":
@@ -280,7 +282,7 @@ def _check_names(m: Any) -> None:
 
 
 def _identity(m: Any) -> bytes:
-    """What the metadata of a continued download have in common: all but the figures."""
+    """The metadata that a continued download must not change: all but the figures."""
     copy = type(m)()
     copy.CopyFrom(m)
     copy.ClearField("statistics")

@@ -17,7 +17,7 @@ T = TypeVar("T")
 
 @dataclasses.dataclass(frozen=True)
 class RetryPolicy:
-    """How patient a client is.
+    """The retry policy of a client.
 
     An attempt that brought something (a chunk, an event, committed points) is not counted: those after it begin anew.
 
@@ -29,7 +29,7 @@ class RetryPolicy:
         The same with a server that has never answered: its address may be wrong.
     initial_backoff, multiplier, max_backoff : float
         Seconds before the second attempt, how much longer before each further one, and the most seconds. A random half
-        is left out. What the server asks for (`Error.retry_after`) is waited for in full.
+        is left out. A delay that the server asks for (`Error.retry_after`) is waited for in full.
     """
 
     max_attempts: int = 8
@@ -95,7 +95,7 @@ class CancelToken:
 
 
 class Attempt:
-    """One attempt at a call, and what the Retrier should know of it."""
+    """One attempt at a call, and its state for the Retrier."""
 
     def __init__(self, deadline: float, cancel: CancelToken) -> None:
         self._deadline = deadline
@@ -120,7 +120,7 @@ def now() -> float:
 
 
 def cancelled_by_caller() -> CancelledError:
-    """What calls raise whose token was cancelled."""
+    """The error of a call whose token was cancelled."""
     return CancelledError("cancelled by the caller")
 
 

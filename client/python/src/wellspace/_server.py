@@ -23,7 +23,7 @@ _SECONDS_TO_END = 10.0  # more than the supervisor gives the server
 
 # Runs the server until it ends by itself, or standard input does: a pipe, which the kernel closes when Python is gone,
 # even if it was killed. A signal at the death of a parent would not do: Linux sends it when the thread ends that has
-# started the child. What the server has said of an error comes on standard output after it has ended.
+# started the child. The server's message about an error comes on standard output after it has ended.
 _SUPERVISOR = """
 directory=$1
 shift
@@ -47,11 +47,16 @@ exit $code
 """
 
 
+def find_program(name: str, variable: str) -> str | None:
+    """The path of the program that a variable of the environment names, or else of `name`; none if it is not there."""
+    return shutil.which(os.environ.get(variable) or name)
+
+
 def find_binary() -> str:
     """The program to start: $WELLSPACE_SERVER_BINARY, or `wellspaced` on the path."""
-    named = os.environ.get(_VARIABLE)
-    found = shutil.which(named or _BINARY)
+    found = find_program(_BINARY, _VARIABLE)
     if found is None:
+        named = os.environ.get(_VARIABLE)
         where = f"{_VARIABLE}={named} is no program" if named else f"there is no {_BINARY} on the path"
         raise ServerNotInstalledError(
             f"{where}; install it, name it in the variable {_VARIABLE}, or say with server='HOST:PORT' where one runs"

@@ -1,4 +1,4 @@
-"""What a session is at."""
+"""The state of a session."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .statistics import seconds_of
 
 @dataclasses.dataclass(frozen=True)
 class SessionInfo:
-    """What a session is at.
+    """The state of a session.
 
     Attributes
     ----------
@@ -32,12 +32,12 @@ class SessionInfo:
         In UTC.
     revision : int
         Grows with every change.
-    point_count, segment_count, seed_count : int
-        What was uploaded, duplicates included.
+    point_count, segment_count, triangle_count, seed_count : int
+        Rows that were uploaded, duplicates included.
     size_count : int
         Sizes at points, see `Session.sizes`.
     stored_bytes : int
-        What it counts against `ServerInfo.max_stored_bytes_per_tenant`.
+        The bytes that count against `ServerInfo.max_stored_bytes_per_tenant`.
     vertex_count, simplex_count : int
         Of the last mesh; 0 before the first.
     last_operation : str
@@ -55,6 +55,7 @@ class SessionInfo:
     revision: int
     point_count: int
     segment_count: int
+    triangle_count: int
     seed_count: int
     size_count: int
     stored_bytes: int
@@ -87,6 +88,7 @@ def info_of_session(message: Any) -> SessionInfo:
         revision=message.revision,
         point_count=message.committed_points,
         segment_count=message.segment_count,
+        triangle_count=message.triangle_count,
         seed_count=message.seed_count,
         size_count=message.size_count,
         stored_bytes=message.stored_bytes,

@@ -1,4 +1,4 @@
-"""Sessions: points, segments and a mesh over them, kept by the server between calls."""
+"""Sessions: points, segments or triangles and a mesh over them, kept by the server between calls."""
 
 from __future__ import annotations
 
@@ -9,22 +9,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from . import _api, _wire
+from . import _api
 from ._arrays import coordinates, indices, number, revision_of
 from ._calls import CallOptions, next_page
 from ._cells import CellReader, Cells
 from ._client import Client, Server, client_of
-from ._domain import DomainArguments, make_domain
+from ._domain import Bounds, DomainArguments
 from ._locate import Located, locate
-from ._mesh import Mesh, signed
+from ._mesh import Mesh
 from ._operations import Operation, operation_of, watch
 from ._parameters import Parameters, fill, naming, split, takes
+from ._plane import PlaneArguments, make_plane
 from ._progress import ProgressOption, told
-from ._queries import nearest_distances, stream_cells
-from ._receiver import damaged
+from ._queries import add_vertices, nearest_distances, stream_cells
 from ._retry import Attempt, CancelToken
 from ._session_info import SessionInfo, info_of_session
 from ._sizes import SizeField, check_sizes, set_sizes, unit_of
+from ._surface import SurfaceArguments, TriangleArguments, make_surface
 from ._transfers import Addition, Download, Update, Upload
 from .errors import CancelledError, Error, InvalidArgumentError, NotFoundError, printable
 
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
 _SECONDS_TO_CANCEL = 5.0
-_BYTES_OF_AN_ADDITION = (4 << 20) - 1024  # the largest request of a server, but for its other fields
 
 
 class Session:
@@ -116,7 +116,7 @@ class Session:
         return f"<wellspace.Session: {printable(self.name)} in {self.dimension}-D at {self.client.address}>"
 
     def info(self, *, timeout: float | None = None, cancel: CancelToken | None = None) -> SessionInfo:
-        """What the session is at. Renews its lease."""
+        """The state of the session. Renews its lease."""
         return info_of_session(self._get(CallOptions(timeout=timeout, cancel=cancel)))
 
     def _get(self, options: CallOptions) -> Any:
@@ -172,7 +172,7 @@ class Session:
     ) -> int:
         """Adds points, (n, d), to the session; returns how many it has now.
 
-        `offset` is the number of the session's points before the first of these. What is there from it on is compared
+        `offset` is the number of the session's points before the first of these. Points there from it on are compared
         by a checksum and not sent again, so that an upload that broke off is simply repeated with the same offset.
         Default: after the points that are there.
         """
@@ -183,7 +183,7 @@ class Session:
             with self._noting_interruption():
                 return upload.run(CallOptions(timeout=timeout, cancel=cancel))
 
-    @takes(DomainArguments)
+    @takes(DomainArguments, PlaneArguments)
     def add_segments(
         self,
         *,
@@ -191,7 +191,7 @@ class Session:
         expected_revision: int | None = None,
         timeout: float | None = None,
         cancel: CancelToken | None = None,
-        **arguments: Unpack[DomainArguments],
+        **arguments: Unpack[PlaneArguments],
     ) -> None:
         """Adds segments, holes and regions to a session in 2-D, and sets the rules, before its first refinement.
 
@@ -205,12 +205,51 @@ class Session:
         """
         if self.dimension != 2:
             raise InvalidArgumentError(f"segments are for 2-D; the session is in {self.dimension}-D", field="segments")
-        (given,) = split("add_segments", arguments, DomainArguments)
-        session = self._get(CallOptions(timeout=timeout, cancel=cancel))
-        domain = make_domain(given, has_box=session.parameters.HasField("domain"))
-        begin = offset if offset is not None else (session.segment_count, session.seed_count)
+        (given,) = split("add_segments", arguments, PlaneArguments)
+        options = CallOptions(timeout=timeout, cancel=cancel)
+        session = self._get(options)
+        bounds = make_plane(given, has_box=session.parameters.HasField("domain"))
+        self._add_bounds(bounds, session, offset, expected_revision, options)
+
+    @takes(DomainArguments, TriangleArguments)
+    def add_triangles(
+        self,
+        *,
+        offset: tuple[int, int] | None = None,
+        expected_revision: int | None = None,
+        timeout: float | None = None,
+        cancel: CancelToken | None = None,
+        **arguments: Unpack[SurfaceArguments],
+    ) -> None:
+        """Adds triangles, holes and regions to a session in 3-D, and sets the rules, before its first refinement.
+
+        Triangles are numbers of the session's points, which may come later.
+
+        Parameters
+        ----------
+        offset : (triangles, seeds)
+            How many the session has before these; see `upload`. Default: after those that are there.
+        **arguments
+        """
+        if self.dimension != 3:
+            raise InvalidArgumentError(
+                f"triangles are for 3-D; the session is in {self.dimension}-D", field="triangles"
+            )
+        (given,) = split("add_triangles", arguments, SurfaceArguments)
+        options = CallOptions(timeout=timeout, cancel=cancel)
+        self._add_bounds(make_surface(given), self._get(options), offset, expected_revision, options)
+
+    def _add_bounds(
+        self,
+        bounds: Bounds,
+        session: Any,
+        offset: tuple[int, int] | None,
+        expected_revision: int | None,
+        options: CallOptions,
+    ) -> None:
+        begin = offset if offset is not None else (getattr(session, bounds.count_field), session.seed_count)
         expected = revision_of(expected_revision, "expected_revision")
-        Addition(self._calls, self.name, domain, begin, expected).run(CallOptions(timeout=timeout, cancel=cancel))
+        Addition(self._calls, self.name, bounds, begin, expected).run(options)
 
     def sizes(
         self,
@@ -235,7 +274,7 @@ class Session:
             Where they are. Default: at the vertices of the session's mesh, one for each, as an adaptive solver has
             them.
         unit : {"radius", "edge"}
-            What the values are: bounds on circumradii, or lengths of edges.
+            The measure of the values: bounds on circumradii, or lengths of edges.
         mesh_revision : int
             Without points: that of the mesh whose vertices they are, `Mesh.revision`; should the session have another
             one by then, `ConflictError` is raised. Default: the last mesh.
@@ -261,10 +300,10 @@ class Session:
         cancel: CancelToken | None = None,
         **arguments: Unpack[Parameters],
     ) -> Operation:
-        """Makes the mesh of what was uploaded, or brings it to other parameters, and waits for it.
+        """Makes the mesh of the uploaded points, or brings it to other parameters, and waits for it.
 
-        The first time all is meshed, later only what has changed. Vertices keep their numbers. Parameters that are
-        not named stay what they were. Ctrl-C and `cancel` cancel the work, and leave the session as it was; when
+        The first time all is meshed, later only changes. Vertices keep their numbers. Parameters that are
+        not named stay as they were. Ctrl-C and `cancel` cancel the work, and leave the session as it was; when
         `timeout` has passed, the work goes on.
 
         Parameters
@@ -327,7 +366,7 @@ class Session:
             try:
                 return self._calls.attempt_unary(method, request, "StartRefinementResponse", attempt)
             except Error as error:
-                # Of what was given up before, the server may be at the end still.
+                # The server may still be ending an operation that was given up before.
                 attempt.is_worth_repeating = self._was_interrupted and error.reason == "SESSION_BUSY"
                 raise
 
@@ -379,7 +418,7 @@ class Session:
             request.page_token = next_page(request.page_token, page.next_page_token)
 
     def _end_quietly(self, request: Any, started: Operation | None) -> None:
-        """Cancels what `request` has started, and waits for its end: then the session takes the next call.
+        """Cancels the operation of `request`, and waits for its end: then the session takes the next call.
 
         Where the call was given up before it had an answer, its repetition tells whether the work was started.
         """
@@ -405,7 +444,7 @@ class Session:
 
         `boundary` False leaves facets, regions and origins of vertices out.
 
-        `since` is a mesh that was downloaded before: where the server knows what has changed since then, that alone is
+        `since` is a mesh that was downloaded before: where the server knows the differences since then, they alone are
         sent. The result is the same to the bit, and a mesh of its own; `since` stays as it is.
         """
         wanted = revision_of(revision, "revision")
@@ -430,34 +469,23 @@ class Session:
     ) -> npt.NDArray[Any]:
         """Adds vertices at points, (k, d), of a session that was refined; returns their numbers, (k,).
 
-        All become vertices or, on an error, none; more than 4 MB of points take several calls. `near` has a vertex near
-        each, from which the place is found in O(1). The session is then to be refined again, which costs their
-        surroundings.
+        `near` has a vertex near each, from which the place is found in O(1). The session is then to be refined again,
+        which costs their surroundings.
+
+        The points are sent in requests with at most 3 MiB of them, 10⁵ points in 3-D. Those of each become vertices
+        all or, on an error, none, and each makes a revision. On an error vertices of the requests before stay, and
+        the message says how many points it is. A repetition of the call is safe, as a point that is a vertex already is
+        given its number. With `expected_revision` a change in between raises `ConflictError`, too.
         """
         cloud = coordinates(points, "points", self.dimension)
         hints = indices([] if near is None else near, "near")
         if near is not None and len(hints) != len(cloud):
             raise InvalidArgumentError(f"near: {len(hints)} vertices for {len(cloud)} points", field="near")
-        options = CallOptions(timeout=timeout, cancel=cancel)
-        request = _api.message("AddVerticesRequest")(
-            name=self.name,
-            request_id=options.id_or_new(),
-            expected_revision=revision_of(expected_revision, "expected_revision"),
-        )
-        arrays = _wire.packed_field(2, cloud) + _wire.packed_field(3, hints)
-        if len(arrays) > _BYTES_OF_AN_ADDITION:
-            raise InvalidArgumentError(
-                f"points: {len(cloud)} take {len(arrays)} bytes in one request, which has at most "
-                f"{_BYTES_OF_AN_ADDITION}; add them in several calls",
-                field="points",
-            )
+        expected = revision_of(expected_revision, "expected_revision")
         with self._noting_interruption():
-            answer = self._calls.unary_bytes("QueryService/AddVertices", request.SerializeToString() + arrays, options)
-        fields = [f for f in _wire.fields(memoryview(answer)) if f.number == 1]
-        vertices = np.concatenate([np.empty(0, np.uint32), *(_wire.packed(field, "<u4") for field in fields)])
-        if len(vertices) != len(cloud):
-            raise damaged(f"{len(vertices)} vertices for {len(cloud)} points")
-        return signed(vertices, int(vertices.max(initial=0)) + 1)
+            return add_vertices(
+                self._calls, self.name, cloud, hints, expected, CallOptions(timeout=timeout, cancel=cancel)
+            )
 
     def remove(
         self,

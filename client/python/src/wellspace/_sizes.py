@@ -1,4 +1,4 @@
-"""Sizes at points: what an adaptive solver asks of a mesh."""
+"""Sizes at points: the demands of an adaptive solver on a mesh."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class SizeArguments(TypedDict, total=False):
     size_values : (m,) float
         Their sizes, above 0. In the unit of the points.
     size_unit : {"radius", "edge"}
-        What `size_values` are: bounds on circumradii, or lengths of edges, see `edge_length`. Default "radius".
+        The measure of `size_values`: bounds on circumradii, or lengths of edges, see `edge_length`. Default "radius".
     """
 
     size_points: Any
@@ -40,7 +40,7 @@ class SizeArguments(TypedDict, total=False):
 class SizeField:
     """Sizes, checked, and where they are; for messages."""
 
-    points: Floats | None  # (m, d); None: those of the vertices of a session's mesh
+    points: Floats | None  # (m, d); None: the vertices of a session's mesh
     values: Floats  # (m,)
     unit: int
 

@@ -10,7 +10,7 @@ from ._arrays import Floats
 from ._calls import Calls, CallOptions
 from ._checksum import crc32c
 from ._delta import DeltaReceiver, metadata_of
-from ._domain import Domain
+from ._domain import Bounds
 from ._mesh import Mesh, mesh_of
 from ._messages import messages_of, point_chunks, receive
 from ._progress import OnProgress, Progress
@@ -57,10 +57,10 @@ class Upload:
             attempt.progressed = True
         if self._offset is None:
             self._offset = committed
-        # What is there from the offset on has to be of these points: the server compares.
+        # Points from the offset on have to be these: the server compares.
         first = min(max(self._offset, committed) - self._offset, len(self._cloud))
         head = _api.message("UploadPointsRequest")(name=self._session, expected_revision=self._expected_revision)
-        # What the attempts before this one committed has changed the revision.
+        # The commits of the attempts before this one have changed the revision.
         self._expected_revision = None
         if first > 0:
             head.checked_from = self._offset
@@ -91,35 +91,37 @@ class Upload:
 
 
 class Addition:
-    """Segments and seeds for a session, after those of `offset`."""
+    """Segments or triangles, and seeds, for a session, after those of `offset`."""
 
     def __init__(
-        self, calls: Calls, session: str, domain: Domain, offset: tuple[int, int], expected_revision: int | None
+        self, calls: Calls, session: str, bounds: Bounds, offset: tuple[int, int], expected_revision: int | None
     ) -> None:
         self._calls = calls
         self._session = session
-        self._domain = domain
-        self._segments, self._seeds = offset
+        self._bounds = bounds
+        self._rows, self._seeds = offset
         self._expected_revision = expected_revision
 
     def run(self, options: CallOptions) -> None:
-        """Adds them. What an attempt has brought is compared by the server when it comes again."""
+        """Adds them. The server compares rows of an earlier attempt when they come again."""
         self._calls.run(options, self._attempt)
 
     def _attempt(self, attempt: Attempt) -> None:
         requests = list(self._requests())
-        # What an attempt before this one committed has changed the revision.
+        # The commits of an attempt before this one have changed the revision.
         self._expected_revision = None
-        self._calls.attempt_upload("SessionService/AddSegments", requests, "AddSegmentsResponse", attempt)
+        method = self._bounds.method
+        self._calls.attempt_upload(f"SessionService/{method}", requests, f"{method}Response", attempt)
 
     def _requests(self) -> Iterator[bytes]:
-        head = _api.message("AddSegmentsRequest")(name=self._session, expected_revision=self._expected_revision)
-        head.seed_offset = self._seeds
-        for first, chunk in self._domain.segment_chunks():
-            head.segment_offset = self._segments + first
+        bounds = self._bounds
+        request = _api.message(f"{bounds.method}Request")
+        head = request(name=self._session, expected_revision=self._expected_revision, seed_offset=self._seeds)
+        for first, chunk in bounds.row_chunks():
+            setattr(head, bounds.offset_field, self._rows + first)
             yield head.SerializeToString() + _wire.message_field(3, chunk)
-        head.segment_offset = self._segments + len(self._domain.ends)
-        for first, chunk in self._domain.face_options(self._segments):
+        setattr(head, bounds.offset_field, self._rows + bounds.row_count)
+        for first, chunk in bounds.option_chunks(self._rows):
             head.seed_offset = self._seeds + first
             yield head.SerializeToString() + _wire.message_field(5, chunk)
 
@@ -160,7 +162,7 @@ class Download:
 
 
 class Update:
-    """One download of what has changed since a mesh, or of the whole mesh where that is of no use."""
+    """One download of the differences from a mesh, or of the whole mesh where that is of no use."""
 
     def __init__(self, calls: Calls, session: str, since: Mesh, boundary: bool, on_progress: OnProgress) -> None:
         self._calls = calls
@@ -181,7 +183,7 @@ class Update:
             try:
                 return self._stream(attempt)
             except Error as error:
-                # Also a mesh that is not what it was: the server's is not damaged then.
+                # Also a mesh that is not as it was: the server's is not damaged then.
                 if error.reason != "DELTA_NOT_KEPT" and error.code != "DATA_LOSS":
                     raise
                 self._whole = MeshReceiver()

@@ -8,16 +8,14 @@ import importlib.resources
 import json
 import os
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _files
+from ._mesh_arrays import MeshArrays
 from .errors import InvalidArgumentError, LimitError
-
-if TYPE_CHECKING:
-    from ._mesh import Mesh
 
 _MARK = "<!--wellspace:mesh-->"
 # Of each array: browsers have no longer texts than twice that.
@@ -58,7 +56,7 @@ class Plot:
         return f"<wellspace.Plot of {self._name}: {sum(map(len, self._pieces)) / 1e6:.1f} MB>"
 
 
-def plot(mesh: Mesh, name: str, up: str, data: Mapping[str, Any] | None, height: int) -> Plot:
+def plot(mesh: MeshArrays, name: str, up: str, data: Mapping[str, Any] | None, height: int) -> Plot:
     """See Mesh.plot."""
     if mesh.dimension not in (2, 3):
         raise InvalidArgumentError(f"a mesh in {mesh.dimension}-D; plot shows 2-D and 3-D", field="mesh")
@@ -71,7 +69,7 @@ def plot(mesh: Mesh, name: str, up: str, data: Mapping[str, Any] | None, height:
     return Plot([before, *_elements(mesh, name, up, _fields(mesh, data or {})), after], name, height)
 
 
-def _fields(mesh: Mesh, data: Mapping[str, Any]) -> dict[str, npt.NDArray[np.float64]]:
+def _fields(mesh: MeshArrays, data: Mapping[str, Any]) -> dict[str, npt.NDArray[np.float64]]:
     """The numbers of the vertices."""
     fields = {}
     for name, values in data.items():
@@ -85,13 +83,19 @@ def _fields(mesh: Mesh, data: Mapping[str, Any]) -> dict[str, npt.NDArray[np.flo
     return fields
 
 
+def _facet_counts(mesh: MeshArrays) -> dict[int, int]:
+    """How many facets each tag has, by ascending tags: those with a name, and those of facets."""
+    tags, counts = np.unique(mesh.facet_tags, return_counts=True)
+    found = {**dict.fromkeys(mesh.facet_names, 0), **dict(zip(tags.tolist(), counts.tolist()))}
+    return dict(sorted(found.items()))
+
+
 def _elements(
-    mesh: Mesh, name: str, up: str, fields: dict[str, npt.NDArray[np.float64]]
+    mesh: MeshArrays, name: str, up: str, fields: dict[str, npt.NDArray[np.float64]]
 ) -> Iterator[str]:
     """The elements of the page that hold the mesh; docs/view.md defines them."""
-    tags = sorted({*mesh.facet_names, *np.unique(mesh.facet_tags).tolist()})
+    counts = _facet_counts(mesh)
     order = np.argsort(mesh.facet_tags, kind="stable")
-    counts = {tag: int(np.count_nonzero(mesh.facet_tags == tag)) for tag in tags}
     ids = sorted({*mesh.region_names, *np.unique(mesh.regions).tolist()})
     header = {
         "format": 1,
@@ -100,7 +104,7 @@ def _elements(
         "up": "xyz".index(up),
         "vertices": len(mesh.points),
         "simplices": len(mesh.simplices),
-        "boundary": [{"tag": tag, "name": mesh.facet_names.get(tag, ""), "facets": counts[tag]} for tag in tags],
+        "boundary": [{"tag": tag, "name": mesh.facet_names.get(tag, ""), "facets": counts[tag]} for tag in counts],
         "regions": [{"id": number, "name": mesh.region_names.get(number, "")} for number in ids],
         "has_simplex_regions": len(ids) > 1,
         "fields": list(fields),
@@ -123,13 +127,14 @@ def _elements(
         yield f'<script type="application/octet-stream" id="mesh-{key}">{encoded}</script>\n'
 
 
-def table(mesh: Mesh) -> str:
-    """What notebooks show of a mesh: a few rows of numbers."""
+def table(mesh: MeshArrays) -> str:
+    """The display of a mesh in notebooks: a few rows of numbers."""
     kind = {2: "triangles", 3: "tetrahedra"}.get(mesh.dimension, "simplices")
     rows = [("vertices", f"{len(mesh.points):,}"), (kind, f"{len(mesh.simplices):,}")]
     if mesh.facet_names:
-        counts = ((name, int(np.count_nonzero(mesh.facet_tags == tag))) for tag, name in mesh.facet_names.items())
-        rows.append(("boundary", ", ".join(f"{name or 'no name'} ({count:,})" for name, count in counts)))
+        counts = _facet_counts(mesh)
+        named = ((name, counts[tag]) for tag, name in mesh.facet_names.items())
+        rows.append(("boundary", ", ".join(f"{name or 'no name'} ({count:,})" for name, count in named)))
     if len(mesh.region_names) > 1:
         rows.append(("regions", ", ".join(name or f"{number}" for number, name in mesh.region_names.items())))
     low, high = ("(" + ", ".join(f"{x:.6g}" for x in corner) + ")" for corner in mesh.box)

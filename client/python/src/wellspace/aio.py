@@ -26,9 +26,11 @@ from ._cells import Cells
 from ._domain import DomainArguments
 from ._locate import Located
 from ._parameters import Parameters, takes
+from ._plane import PlaneArguments
 from ._progress import Progress, ProgressOption
 from ._retry import CancelToken
 from ._sizes import SizeArguments
+from ._surface import TriangleArguments
 from .statistics import Estimate, ServerInfo
 
 if TYPE_CHECKING:
@@ -72,7 +74,7 @@ async def _run(call: Callable[..., T], /, *positional: Any, **options: Any) -> T
             given._remove(token.cancel)
 
 
-@takes(DomainArguments, SizeArguments, Parameters)
+@takes(DomainArguments, PlaneArguments, TriangleArguments, SizeArguments, Parameters)
 async def mesh(
     points: Any,
     *,
@@ -96,7 +98,7 @@ async def mesh(
     )
 
 
-@takes(DomainArguments, SizeArguments, Parameters)
+@takes(DomainArguments, PlaneArguments, TriangleArguments, SizeArguments, Parameters)
 async def estimate(
     points: Any,
     *,
@@ -174,6 +176,9 @@ class Session:
 
     async def add_segments(self, **options: Any) -> None:
         await _run(self._session.add_segments, **options)
+
+    async def add_triangles(self, **options: Any) -> None:
+        await _run(self._session.add_triangles, **options)
 
     async def locate(self, points: Any, **options: Any) -> Located:
         return await _run(self._session.locate, points, **options)

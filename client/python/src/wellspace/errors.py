@@ -1,4 +1,4 @@
-"""What goes wrong, as exceptions.
+"""The errors of the package, as exceptions.
 
 Every exception of the package is an `Error`. Its class says what kind of failure it is, as the status codes of gRPC
 do; `Error.reason` says which one.
@@ -11,7 +11,7 @@ from typing import Any
 
 from . import _api
 
-# What the fields of the service's messages are called among the arguments of this package.
+# The names of the fields of the service's messages among the arguments of this package.
 _ARGUMENTS = {
     "dimension": "dimension",
     "rho": "rho",
@@ -37,12 +37,12 @@ class Error(Exception):
     Attributes
     ----------
     message : str
-        What happened, in English.
+        The description of the error, in English.
     reason : str
         The service's name for it, such as ``"INVALID_POINTS"``; see `ErrorReason` of the API. Empty where the service
         gives none: errors that this package finds, lost connections, deadlines.
     field : str
-        The path of what is to blame, such as ``"parameters.rho"`` in the request, or ``"points[17]"`` for a row of
+        The path of the field to blame, such as ``"parameters.rho"`` in the request, or ``"points[17]"`` for a row of
         an argument. Empty if nothing is.
     argument : str
         The argument of this package that `field` stands for, such as ``"size"``; empty if none does.
@@ -73,6 +73,10 @@ class Error(Exception):
     def __str__(self) -> str:
         argument = self.argument if self.field.startswith("parameters.") else ""
         return f"{self.message} (argument {argument})" if argument else self.message
+
+    def with_message(self, message: str) -> Error:
+        """The same error with another message."""
+        return _rebuild(type(self), message, self.reason, self.field, self.retry_after, self.code)
 
     def __reduce__(self) -> Any:
         return _rebuild, (type(self), self.message, self.reason, self.field, self.retry_after, self.code)
@@ -184,12 +188,13 @@ _CODES = (
 ).split()
 
 
-# What a terminal may obey: control characters of ASCII and of Latin-1; and halves of pairs, which cannot be encoded.
+# The characters that a terminal may obey: control characters of ASCII and of Latin-1; and halves of pairs, which cannot
+# be encoded.
 _CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\ud800-\udfff]")
 
 
 def printable(text: str) -> str:
-    """`text` of a server, without what a terminal may obey: \\x1b stands for an escape character."""
+    """`text` of a server, without characters that a terminal may obey: \\x1b stands for an escape character."""
     return _CONTROL.sub(lambda found: found[0].encode("unicode_escape").decode("ascii"), text)
 
 
@@ -222,6 +227,6 @@ def _read_details(serialized: bytes) -> tuple[str, str, float | None]:
             elif name == "google.rpc.RetryInfo":
                 delay = _api.message(name).FromString(detail.value).retry_delay
                 retry_after = max(0.0, delay.seconds + delay.nanos * 1e-9)
-    except Exception:  # of protobuf, which has several: what is no message says nothing
+    except Exception:  # of protobuf, which has several: other bytes say nothing
         pass
     return reason, field, retry_after

@@ -23,7 +23,7 @@ class PhaseSeconds:
 
 @dataclasses.dataclass(frozen=True)
 class OperationCounters:
-    """How often the operations of the query structure were done; see OperationCounters of the API."""
+    """Counts of the operations of the query structure; see OperationCounters of the API."""
 
     tree_leaves: int
     cells_computed: int
@@ -55,7 +55,7 @@ class LeftSliver:
 
 @dataclasses.dataclass(frozen=True)
 class SliverStatistics:
-    """What was done against slivers: tetrahedra with a dihedral angle below `min_dihedral`.
+    """Counts of the repair of slivers: tetrahedra with a dihedral angle below `min_dihedral`.
 
     `left` of those that were `found` could not be repaired; the three counts after it say why. `min_angle_before_deg`
     is in degrees.
@@ -76,7 +76,7 @@ class SliverStatistics:
 
 @dataclasses.dataclass(frozen=True)
 class DomainStatistics:
-    """What became of the points and segments of a domain in the plane; see DomainStatistics of the API."""
+    """Counts of the points and segments of a domain in the plane; see DomainStatistics of the API."""
 
     unmeshed_points: int
     segments: int
@@ -89,6 +89,34 @@ class DomainStatistics:
     min_input_angle_deg: float
     unused_seeds: int
     first_unused_seed: int
+
+
+@dataclasses.dataclass(frozen=True)
+class SurfaceStatistics:
+    """Counts of the triangles that bound a domain, and the fidelity of the mesh; see SurfaceStatistics of the API."""
+
+    triangles: int
+    welded_points: int
+    dropped_triangles: int
+    flipped_triangles: int
+    unmeshed_points: int
+    patches: int
+    curves: int
+    corners: int
+    solids: int
+    facets: int
+    ridges: int
+    lost_ridges: int
+    exempt_simplices: int
+    acute_curves: int
+    tube_simplices: int
+    min_angle_outside_deg: float
+    unused_seeds: int
+    first_unused_seed: int
+    min_facet_angle_deg: float
+    deviation_of_facets: float
+    deviation_of_surface: float
+    volumes: tuple[float, ...]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -115,6 +143,8 @@ class Statistics:
         None: nothing was asked for against slivers.
     domain : DomainStatistics or None
         Of a domain with segments.
+    surface : SurfaceStatistics or None
+        Of a domain that triangles bound.
     """
 
     input_points: int
@@ -130,11 +160,12 @@ class Statistics:
     peak_memory_bytes: int
     slivers: SliverStatistics | None
     domain: DomainStatistics | None
+    surface: SurfaceStatistics | None
 
 
 @dataclasses.dataclass(frozen=True)
 class Estimate:
-    """How large a mesh would be. All numbers are estimates, 2**53 stands for that or more.
+    """The size that a mesh would have. All numbers are estimates, 2**53 stands for that or more.
 
     `memory_bytes` is the most that meshing would take at once on the server.
     """
@@ -147,7 +178,7 @@ class Estimate:
 
 @dataclasses.dataclass(frozen=True)
 class ServerInfo:
-    """What a server is, accepts and does; see GetServerInfoResponse of the API. Durations are in seconds."""
+    """A server's version, limits and load; see GetServerInfoResponse of the API. Durations are in seconds."""
 
     version: str
     dimensions: tuple[int, ...]
@@ -181,7 +212,7 @@ def fill(kind: type[T], message: Any, **others: Any) -> T:
 
 def statistics_of(message: Any) -> Statistics:
     """Of a MeshStatistics."""
-    slivers = domain = None
+    slivers = domain = surface = None
     if message.HasField("slivers"):
         reasons = _api.enum_names("SliverReason")
         left = tuple(
@@ -191,6 +222,8 @@ def statistics_of(message: Any) -> Statistics:
         slivers = fill(SliverStatistics, message.slivers, flattest_left=left)
     if message.HasField("domain"):
         domain = fill(DomainStatistics, message.domain)
+    if message.HasField("surface"):
+        surface = fill(SurfaceStatistics, message.surface, volumes=tuple(message.surface.volumes))
     return fill(
         Statistics,
         message,
@@ -199,6 +232,7 @@ def statistics_of(message: Any) -> Statistics:
         counters=fill(OperationCounters, message.counters),
         slivers=slivers,
         domain=domain,
+        surface=surface,
     )
 
 

@@ -1,4 +1,4 @@
-// What tests of readers of planar domains share: a folder, and a domain or a refusal of a file in it.
+// A fixture for tests of readers of planar domains: a folder, and a domain or a refusal of a file in it.
 #ifndef WELLSPACE_TESTS_CLIENT_FORMATS_DOMAIN_READ_DOMAIN_FIXTURE_H_
 #define WELLSPACE_TESTS_CLIENT_FORMATS_DOMAIN_READ_DOMAIN_FIXTURE_H_
 

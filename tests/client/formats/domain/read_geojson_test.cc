@@ -131,7 +131,7 @@ TEST_F(ReadGeoJsonTest, RingsMayRepeatPointsAndBeOpen) {
   // Positions are those of the file.
   EXPECT_EQ(Point(domain, 1), "a.geojson:1: coordinates[0][0][2]");
   EXPECT_EQ(Point(domain, 2), "a.geojson:1: coordinates[0][0][3]");
-  // What is not next to each other is left to the cleaning: a bow tie, and a spike.
+  // Sides that meet without being next to each other are left to the cleaning: a bow tie, and a spike.
   EXPECT_THAT(ReadGeometry("Polygon", "[[[0,0],[1,1],[1,0],[0,1],[0,0]]]").points, SizeIs(8));
   EXPECT_THAT(ReadGeometry("Polygon", "[[[0,0],[1,0],[1,1],[2,2],[1,1],[0,0]]]").points, SizeIs(10));
 }
@@ -236,7 +236,7 @@ TEST_F(ReadGeoJsonTest, WhatEnclosesNothingIsLeftOutAndCounted) {
     EXPECT_EQ(domain.segment_count(), one.segments);
     EXPECT_THAT(Without(absl::StrJoin(domain.notes, "; ")), HasSubstr(one.note));
   }
-  // What is hardly more than a line is a ring, and so is one that turns both ways.
+  // A ring may be hardly more than a line, and may turn both ways.
   EXPECT_EQ(ReadGeometry("Polygon", "[[[0,0],[1,1],[2,2.0000000000000004]]]").segment_count(), 3u);
   EXPECT_EQ(ReadGeometry("Polygon", "[[[0,0],[2,2],[2,0],[0,2]]]").segment_count(), 4u);
 }

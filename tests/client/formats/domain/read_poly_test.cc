@@ -200,7 +200,7 @@ TEST_F(ReadPolyTest, ErrorsNameTheLineAndWhatIsExpected) {
   }
 }
 
-// What a file announces costs nothing: these end at once, in little memory.
+// Counts that a file announces cost nothing: these end at once, in little memory.
 TEST_F(ReadPolyTest, HugeCountsAreNotBelieved) {
   EXPECT_EQ(ReadBad("a.poly", "4294967295 2 0 0\n0 0 0\n"),
             "a.poly:2: expected 4294967295 points, as the header says, got 1");

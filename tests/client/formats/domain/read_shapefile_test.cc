@@ -46,7 +46,7 @@ std::string File(int32_t type, const std::vector<std::string>& contents) {
          Little(int32_t{1000}) + Little(type) + Numbers(std::vector<double>(8)) + records;
 }
 
-// Polylines and polygons; `more` are what follows the points.
+// Polylines and polygons; `more` are the fields that follow the points.
 std::string Shape(int32_t type, const std::vector<int32_t>& parts, const std::vector<double>& points,
                   const std::string& more = "") {
   std::string bytes = Little(type) + Numbers({0, 0, 0, 0}) + Little(static_cast<int32_t>(parts.size())) +

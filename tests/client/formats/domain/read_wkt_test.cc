@@ -1,4 +1,4 @@
-// Well-known text: every geometry as people write it, and what is none.
+// Well-known text: every geometry as people write it, and text that is none.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

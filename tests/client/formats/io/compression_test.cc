@@ -1,3 +1,4 @@
+// Compressed blocks give their bytes back, and damaged ones are refused.
 #include "client/formats/io/compression.h"
 
 #include <gmock/gmock.h>
@@ -58,7 +59,7 @@ TEST(CompressionTest, RefusesOtherSizesAndCutData) {
     for (size_t size = 0; size < one.compressed.size(); ++size) {
       EXPECT_FALSE(one.inflate(one.compressed.substr(0, size), kText.size()).ok()) << one.name << size;
     }
-    if (one.inflate != InflateZlib) {  // which does not look at what follows its end
+    if (one.inflate != InflateZlib) {  // which does not look at bytes behind its end
       EXPECT_FALSE(one.inflate(one.compressed + '\x10', kText.size()).ok()) << one.name;
     }
   }

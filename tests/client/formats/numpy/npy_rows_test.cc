@@ -1,3 +1,4 @@
+// Rows of an NPY file, read in pieces, against the whole file.
 #include "client/formats/numpy/npy_rows.h"
 
 #include <gmock/gmock.h>

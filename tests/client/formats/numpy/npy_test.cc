@@ -1,3 +1,4 @@
+// Headers and arrays as numpy writes them, in every type and order, and those that are refused.
 #include "client/formats/numpy/npy.h"
 
 #include <gmock/gmock.h>
@@ -219,7 +220,7 @@ TEST_F(NpyCloudTest, Errors) {
             "a.npy[1]: coordinate 2: expected a finite number, got inf; --skip-invalid leaves such points out");
 }
 
-// A pipe has no size that could refute the header: memory grows with what comes.
+// A pipe has no size that could refute the header: memory grows with the bytes that come.
 TEST_F(NpyCloudTest, ReadsPipesWithoutBelievingThem) {
   const std::string path = folder_.Path("pipe.npy");
   ASSERT_EQ(mkfifo(path.c_str(), 0600), 0);

@@ -1,3 +1,4 @@
+// Arrays of VTK in base64, plain and in blocks, against known texts; every cut of one is refused.
 #include "client/formats/vtk/vtk_array.h"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// What VTK's own writers make: appended data, pieces, meshes in the legacy format and of polygons.
+// Files of VTK's own writers: appended data, pieces, meshes in the legacy format and of polygons.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <zlib.h>
@@ -26,7 +26,7 @@ std::string TestData(const std::string& name) {
   return std::string(folder == nullptr ? "tests/data" : folder) + "/formats/" + name;
 }
 
-// How a file has its arrays.
+// The encoding of a file's arrays.
 struct Encoding {
   bool is_base64 = false;
   bool is_compressed = false;
@@ -279,7 +279,7 @@ TEST_F(VtkFilesTest, OurFlatPointsHaveTwoCoordinates) {
   }
 }
 
-// The kind of what `convert` lost: cells that are no simplices, of which only the points are taken.
+// The kind of the cells that `convert` lost: cells that are no simplices, of which only the points are taken.
 TEST_F(VtkFilesTest, CellsThatAreNotReadAreToldOf) {
   std::string quads = kLegacySquare;
   quads.replace(quads.find("CELLS 2 8"), std::string::npos, "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n9\n");

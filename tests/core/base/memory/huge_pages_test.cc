@@ -1,3 +1,4 @@
+// Vectors on large pages keep their items, begin where they should and give memory back to the system.
 #include "core/base/memory/huge_pages.h"
 
 #include <cstddef>

@@ -1,3 +1,4 @@
+// When large pages are asked for, by times that the test makes up.
 #include "core/base/memory/page_choice.h"
 
 #include <cstddef>

@@ -1,3 +1,4 @@
+// Runs of pages from the pool: places, order, return, and threads that share it.
 #include "core/base/memory/page_pool.h"
 
 #include <algorithm>
@@ -49,7 +50,7 @@ TEST(PagePoolTest, TheFirstRunThatIsLongEnoughIsTaken) {
   EXPECT_EQ(Take(pool, kPage), runs[0]);
   EXPECT_EQ(Take(pool, 2 * kPage), runs[3] + kPage);
   EXPECT_EQ(Take(pool, kPage), runs[0] + kPage);
-  // As large as any: it needs a large page of its own, and what lies on the first is served from there.
+  // As large as any: it needs a large page of its own, and blocks on the first are served from there.
   std::byte* const whole = Take(pool, kHugePage);
   EXPECT_EQ(reinterpret_cast<uintptr_t>(whole) % kHugePage, 0u);
   EXPECT_NE(whole, runs[0]);
@@ -71,7 +72,7 @@ TEST(PagePoolTest, ALargePageGoesWithTheLastOnIt) {
   EXPECT_FALSE(test::IsMapped(third));
 }
 
-// Takes and gives back at random; a run that was taken holds what was written to it.
+// Takes and gives back at random; a run that was taken holds the bytes written to it.
 void TakeAtRandom(PagePool& pool, unsigned seed) {
   std::mt19937 generator(seed);
   std::vector<Run> runs;

@@ -1,4 +1,4 @@
-// What is computed side by side, against plain loops, and with each of the processor's units to the bit the same.
+// Computations side by side, against plain loops, and with each of the processor's units to the bit the same.
 #include "core/base/simd/lanes.h"
 
 #include <gtest/gtest.h>
@@ -43,7 +43,7 @@ Point<D> DrawPoint(SplitMix64& random) {
   return p;
 }
 
-// What the processor is asked for only where it has it.
+// Compiled for AVX2: to be called only where the processor has it.
 template <int D>
 WELLSPACE_AVX2 bool ComputeExcessesAvx2(const Point<D>& normal, double offset, double length, double error,
                                         NodeColumns<D>& columns) {

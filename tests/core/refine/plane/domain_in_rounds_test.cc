@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "core/base/thread_team.h"
-#include "core/domain_cloud.h"
-#include "core/mesher.h"
+#include "core/input/domain_cloud.h"
+#include "core/meshers/mesher.h"
 #include "core/refine/plane/plane_domain.h"
 #include "core/refine/refine.h"
 #include "core/simplex/domain_simplices.h"
@@ -120,9 +120,9 @@ struct Refined {
     planar = std::move(made->planar);
     EXPECT_TRUE(
         structure.Initialize(made->cloud.grid, std::move(made->cloud.points), kMany, 1, context, planar->Ends()).ok());
-    refinement = std::make_unique<Refinement<PlaneDomain>>(structure, made->domain.MinEdge(), PlaneDomain(*planar));
+    refinement = std::make_unique<Refinement<PlaneDomain>>(structure, made->frame.MinEdge(), PlaneDomain(*planar));
     MeshCriteria<2> criteria{.rho = rho};
-    criteria.sizes = SizeField<2>(size * made->domain.scale);
+    criteria.sizes = SizeField<2>(size * made->frame.scale);
     const absl::Status status = refinement->Run(criteria, kMany, threads, context);
     EXPECT_TRUE(status.ok()) << status;
   }

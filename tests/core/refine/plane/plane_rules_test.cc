@@ -1,4 +1,4 @@
-// What is found of single cells in a domain, and what they ask for.
+// The assessment of single cells in a domain, and the points that they ask for.
 #include "core/refine/plane/plane_rules.h"
 
 #include <gtest/gtest.h>

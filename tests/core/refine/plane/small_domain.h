@@ -10,16 +10,16 @@
 #include <vector>
 
 #include "core/base/run_context.h"
-#include "core/domain_cloud.h"
 #include "core/features/features.h"
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
+#include "core/input/domain_cloud.h"
 #include "core/refine/plane/planar_domain.h"
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::test {
 
-// What Refinement works on, before the first insertion.
+// The structure and the domain that Refinement works on, before the first insertion.
 struct SmallDomain {
   // `ends` are pairs of numbers of points. With FaceRule::kBox the sides of `box` are segments, too.
   SmallDomain(const std::vector<core::Point<2>>& points, std::vector<uint32_t> ends, core::FaceRule faces,
@@ -35,7 +35,7 @@ struct SmallDomain {
     absl::StatusOr<core::DomainCloud> made =
         core::MakeDomainCloud(coordinates, features, box, 0, 1'000'000, 1, context);
     EXPECT_TRUE(made.ok()) << made.status();
-    EXPECT_EQ(made->domain.scale, 1);
+    EXPECT_EQ(made->frame.scale, 1);
     planar = std::move(made->planar);
     EXPECT_TRUE(
         structure.Initialize(made->cloud.grid, std::move(made->cloud.points), 100'000, 1, context, planar->Ends())

@@ -1,4 +1,4 @@
-// Records of a batch: which vertices conflict with them, and what becomes of provisional numbers in a replay.
+// Records of a batch: vertices that conflict with them, and provisional numbers in a replay.
 #include "core/refine/speculation/batch.h"
 
 #include <gmock/gmock.h>

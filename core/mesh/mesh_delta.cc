@@ -1,0 +1,378 @@
+#include "core/mesh/mesh_delta.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <limits>
+#include <span>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
+
+namespace wellspace::core {
+namespace {
+
+constexpr uint32_t kNoRow = std::numeric_limits<uint32_t>::max();
+constexpr size_t kRowsBetweenChecks = size_t{1} << 14;
+// Slots of a table for each of its rows, at least: most rows are then found in the first one or two.
+constexpr uint64_t kSlotsPerRow = 2;
+
+constexpr uint64_t Mixed(uint64_t hash, uint64_t value) {
+  hash = (hash ^ value) * 0x9e37'79b9'7f4a'7c15;
+  return hash ^ (hash >> 32);
+}
+
+uint64_t SlotsFor(uint64_t rows) { return std::bit_ceil(kSlotsPerRow * std::max<uint64_t>(rows, 1)); }
+
+// The bits of an array, as one number.
+template <typename Values>
+uint64_t ExtendFingerprint(uint64_t hash, const Values& values) {
+  const size_t bytes = values.size() * sizeof(values[0]);
+  const char* data = reinterpret_cast<const char*>(values.data());
+  hash = Mixed(hash, bytes);
+  for (size_t at = 0; at < bytes; at += sizeof(uint64_t)) {
+    uint64_t word = 0;
+    std::memcpy(&word, data + at, std::min(sizeof(word), bytes - at));
+    hash = Mixed(hash, word);
+  }
+  return hash;
+}
+
+uint64_t FingerprintOf(const Mesh& mesh) {
+  uint64_t hash = ExtendFingerprint(static_cast<uint64_t>(mesh.dimension), mesh.points);
+  hash = ExtendFingerprint(hash, mesh.weights);
+  hash = ExtendFingerprint(hash, mesh.simplices);
+  hash = ExtendFingerprint(hash, mesh.input_vertex);
+  hash = ExtendFingerprint(hash, mesh.vertex_origins);
+  hash = ExtendFingerprint(hash, mesh.vertex_tags);
+  hash = ExtendFingerprint(hash, mesh.simplex_regions);
+  hash = ExtendFingerprint(hash, mesh.facets);
+  if (!mesh.ridges.empty()) {  // others have the fingerprints that earlier builds have written down
+    hash = ExtendFingerprint(hash, mesh.ridges);
+  }
+  return ExtendFingerprint(hash, mesh.moved_vertices);
+}
+
+// Finds rows of an array by their numbers.
+class RowTable {
+ public:
+  RowTable(std::span<const uint32_t> rows, size_t width)
+      : rows_(rows), width_(width), slots_(SlotsFor(rows.size() / width), kNoRow) {}
+
+  absl::Status Fill(const RunContext& context) {
+    for (uint64_t row = 0; row < rows_.size() / width_; ++row) {
+      if (row % kRowsBetweenChecks == 0) {
+        WELLSPACE_RETURN_IF_ERROR(context.Check());
+      }
+      uint64_t slot = HashOf(&rows_[row * width_]);
+      while (slots_[slot] != kNoRow) {
+        slot = (slot + 1) & (slots_.size() - 1);
+      }
+      slots_[slot] = static_cast<uint32_t>(row);
+    }
+    return absl::OkStatus();
+  }
+
+  // The first row that equals `row`, or kNoRow.
+  uint32_t Find(const uint32_t* row) const {
+    uint64_t slot = HashOf(row);
+    while (slots_[slot] != kNoRow && !std::equal(row, row + width_, &rows_[slots_[slot] * width_])) {
+      slot = (slot + 1) & (slots_.size() - 1);
+    }
+    return slots_[slot];
+  }
+
+ private:
+  uint64_t HashOf(const uint32_t* row) const {
+    uint64_t hash = width_;
+    for (size_t i = 0; i < width_; ++i) {
+      hash = Mixed(hash, row[i]);
+    }
+    return hash & (slots_.size() - 1);
+  }
+
+  const std::span<const uint32_t> rows_;
+  const size_t width_;
+  HugeVector<uint32_t> slots_;  // numbers of rows; free ones are kNoRow
+};
+
+uint64_t BytesIn(const MovedRows& rows) {
+  return rows.runs.size() * sizeof(RowRun) + rows.added.size() * sizeof(uint32_t);
+}
+
+absl::Status TooLarge(uint64_t max_bytes) {
+  return absl::ResourceExhaustedError(absl::StrCat("the difference takes more than ", max_bytes, " bytes"));
+}
+
+// Where the rows of `next` come from. Equal rows next to each other make a run, so that most of them are not looked up.
+absl::StatusOr<MovedRows> DiffMovedRows(std::span<const uint32_t> base, std::span<const uint32_t> next, size_t width,
+                                        uint64_t max_bytes, const RunContext& context) {
+  RowTable table(base, width);
+  WELLSPACE_RETURN_IF_ERROR(table.Fill(context));
+  MovedRows moved;
+  const uint64_t base_rows = base.size() / width;
+  uint64_t expected = 0;  // the row of the base behind the last that was kept
+  for (uint64_t row = 0; row < next.size() / width; ++row) {
+    if (row % kRowsBetweenChecks == 0) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+      if (BytesIn(moved) > max_bytes) {
+        return TooLarge(max_bytes);
+      }
+    }
+    const uint32_t* values = &next[row * width];
+    const bool goes_on = expected < base_rows && std::equal(values, values + width, &base[expected * width]);
+    const uint64_t found = goes_on ? expected : table.Find(values);
+    if (found == kNoRow) {
+      if (moved.runs.empty()) {
+        moved.runs.push_back({.begin = 0, .kept = 0, .added = 0});
+      }
+      ++moved.runs.back().added;
+      moved.added.insert(moved.added.end(), values, values + width);
+      continue;
+    }
+    if (moved.runs.empty() || moved.runs.back().added > 0 || found != expected) {
+      moved.runs.push_back({.begin = found, .kept = 0, .added = 0});
+    }
+    ++moved.runs.back().kept;
+    expected = found + 1;
+  }
+  return moved;
+}
+
+template <typename T>
+bool IsSameRow(const T* a, const T* b, size_t width) {
+  return std::memcmp(a, b, width * sizeof(T)) == 0;  // to the bit: zeros have signs
+}
+
+template <typename T>
+ChangedRows<T> DiffChangedRows(std::span<const T> base, std::span<const T> next, size_t width) {
+  ChangedRows<T> rows{.rows = next.size() / width};
+  const size_t common = std::min(base.size(), next.size()) / width;
+  for (size_t row = 0; row < common; ++row) {
+    if (!IsSameRow(&base[row * width], &next[row * width], width)) {
+      rows.changed.push_back(static_cast<uint32_t>(row));
+      rows.values.insert(rows.values.end(), &next[row * width], &next[row * width] + width);
+    }
+  }
+  rows.values.insert(rows.values.end(), next.begin() + common * width, next.end());
+  return rows;
+}
+
+// Calls visit(row, base_row) for each row that the runs keep.
+template <typename Visit>
+void ForEachKept(const HugeVector<RowRun>& runs, Visit visit) {
+  uint64_t row = 0;
+  for (const RowRun& run : runs) {
+    for (uint64_t i = 0; i < run.kept; ++i) {
+      visit(row + i, run.begin + i);
+    }
+    row += run.kept + run.added;
+  }
+}
+
+// Calls visit(first, end) for the rows of each run that are new.
+template <typename Visit>
+void ForEachAdded(const HugeVector<RowRun>& runs, Visit visit) {
+  uint64_t row = 0;
+  for (const RowRun& run : runs) {
+    visit(row + run.kept, row + run.kept + run.added);
+    row += run.kept + run.added;
+  }
+}
+
+ChangedRows<int32_t> DiffRegions(const Mesh& base, const Mesh& next, const HugeVector<RowRun>& runs) {
+  ChangedRows<int32_t> rows{.rows = next.simplex_regions.size()};
+  if (base.simplex_regions.empty() || next.simplex_regions.empty()) {
+    rows.values = next.simplex_regions;
+    return rows;
+  }
+  ForEachKept(runs, [&](uint64_t row, uint64_t base_row) {
+    if (next.simplex_regions[row] != base.simplex_regions[base_row]) {
+      rows.changed.push_back(static_cast<uint32_t>(row));
+      rows.values.push_back(next.simplex_regions[row]);
+    }
+  });
+  ForEachAdded(runs, [&](uint64_t first, uint64_t end) {
+    rows.values.insert(rows.values.end(), next.simplex_regions.begin() + first, next.simplex_regions.begin() + end);
+  });
+  return rows;
+}
+
+template <typename... Parts>
+absl::Status Contradiction(const Parts&... parts) {
+  return absl::InvalidArgumentError(absl::StrCat("the difference cannot be applied to this mesh: ", parts...));
+}
+
+// The array that the runs make. A base of another mesh has too few rows, or none that are needed.
+absl::StatusOr<HugeVector<uint32_t>> ApplyMovedRows(std::span<const uint32_t> base, const MovedRows& rows,
+                                                    size_t width) {
+  const uint64_t base_rows = base.size() / width;
+  HugeVector<uint32_t> next;
+  uint64_t taken = 0;  // of the new rows
+  for (const RowRun& run : rows.runs) {
+    if (run.begin > base_rows || run.kept > base_rows - run.begin || run.added > rows.added.size() / width - taken) {
+      return Contradiction("it keeps ", run.kept, " rows from row ", run.begin, " on, of ", base_rows);
+    }
+    next.insert(next.end(), base.begin() + run.begin * width, base.begin() + (run.begin + run.kept) * width);
+    const auto added = rows.added.begin() + taken * width;
+    next.insert(next.end(), added, added + run.added * width);
+    taken += run.added;
+  }
+  return taken * width == rows.added.size() ? absl::StatusOr<HugeVector<uint32_t>>(std::move(next))
+                                            : Contradiction("it has rows that no run takes");
+}
+
+// Puts the values of the rows that are listed, which are the first of `values`, into `array`.
+template <typename T>
+absl::Status PutChanged(const ChangedRows<T>& rows, size_t width, HugeVector<T>& array) {
+  if (rows.changed.size() > rows.values.size() / width) {
+    return Contradiction("it lists ", rows.changed.size(), " rows, and has ", rows.values.size() / width);
+  }
+  for (size_t i = 0; i < rows.changed.size(); ++i) {
+    if (rows.changed[i] >= array.size() / width) {
+      return Contradiction("it changes row ", rows.changed[i], " of ", array.size() / width);
+    }
+    std::copy_n(&rows.values[i * width], width, &array[rows.changed[i] * width]);
+  }
+  return absl::OkStatus();
+}
+
+template <typename T>
+absl::StatusOr<HugeVector<T>> ApplyChangedRows(std::span<const T> base, const ChangedRows<T>& rows, size_t width) {
+  if (rows.rows > kNoRow) {
+    return Contradiction("it makes ", rows.rows, " rows");
+  }
+  const uint64_t numbers = rows.rows * width;
+  HugeVector<T> next(base.begin(), base.begin() + std::min<uint64_t>(base.size() / width * width, numbers));
+  WELLSPACE_RETURN_IF_ERROR(PutChanged(rows, width, next));
+  next.insert(next.end(), rows.values.begin() + rows.changed.size() * width, rows.values.end());
+  if (next.size() != numbers) {
+    return Contradiction("it makes ", next.size() / width, " rows of ", rows.rows);
+  }
+  return next;
+}
+
+absl::StatusOr<HugeVector<int32_t>> ApplyRegions(const Mesh& base, const MeshDelta& delta) {
+  const ChangedRows<int32_t>& rows = delta.simplex_regions;
+  if (rows.rows == 0 || base.simplex_regions.empty()) {
+    return ApplyChangedRows<int32_t>({}, rows, 1);
+  }
+  if (base.simplex_regions.size() != base.simplex_count() || rows.rows != delta.simplices ||
+      rows.changed.size() > rows.values.size()) {
+    return Contradiction("it has regions of ", rows.rows, " of ", delta.simplices, " simplices");
+  }
+  HugeVector<int32_t> next(rows.rows);
+  ForEachKept(delta.kept_simplices.runs,
+              [&](uint64_t row, uint64_t base_row) { next[row] = base.simplex_regions[base_row]; });
+  WELLSPACE_RETURN_IF_ERROR(PutChanged(rows, 1, next));
+  std::span<const int32_t> added(rows.values);
+  added = added.subspan(rows.changed.size());
+  bool has_all = true;
+  ForEachAdded(delta.kept_simplices.runs, [&](uint64_t first, uint64_t end) {
+    has_all = has_all && end - first <= added.size();
+    if (has_all) {
+      std::copy_n(added.begin(), end - first, next.begin() + first);
+      added = added.subspan(end - first);
+    }
+  });
+  return has_all && added.empty() ? absl::StatusOr<HugeVector<int32_t>>(std::move(next))
+                                  : Contradiction("it has other regions than new simplices");
+}
+
+template <typename T>
+uint64_t BytesOf(const HugeVector<T>& values) {
+  return values.size() * sizeof(T);
+}
+
+template <typename T>
+uint64_t BytesOf(const ChangedRows<T>& rows) {
+  return BytesOf(rows.changed) + BytesOf(rows.values);
+}
+
+}  // namespace
+
+uint64_t MeshDelta::memory_bytes() const {
+  return BytesOf(points) + BytesOf(weights) + BytesOf(input_vertex) + BytesOf(vertex_origins) + BytesOf(vertex_tags) +
+         BytesIn(kept_simplices) + BytesOf(simplex_regions) + BytesIn(kept_facets) + BytesIn(kept_ridges) +
+         BytesOf(moved_vertices);
+}
+
+uint64_t DeltaScratchBytes(uint64_t base_simplices) { return SlotsFor(base_simplices) * sizeof(uint32_t); }
+
+absl::StatusOr<MeshDelta> DiffMeshes(const Mesh& base, const Mesh& next, uint64_t max_bytes,
+                                     const RunContext& context) {
+  if (base.dimension != next.dimension || base.dimension < 1) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("meshes of dimension ", base.dimension, " and ", next.dimension, " have no difference"));
+  }
+  for (const Mesh* mesh : {&base, &next}) {
+    if (std::max({mesh->vertex_count(), mesh->simplex_count(), mesh->facet_count(), uint64_t{mesh->input_vertex.size()},
+                  uint64_t{mesh->ridges.size() / 2}}) >= kNoRow) {
+      return absl::ResourceExhaustedError("differences are of meshes with less than 2^32 - 1 simplices and vertices");
+    }
+  }
+  const size_t dimension = base.dimension;
+  MeshDelta delta;
+  delta.dimension = base.dimension;
+  delta.base_vertices = base.vertex_count();
+  delta.base_simplices = base.simplex_count();
+  delta.vertices = next.vertex_count();
+  delta.simplices = next.simplex_count();
+  delta.fingerprint = FingerprintOf(next);
+  delta.points = DiffChangedRows<double>(base.points, next.points, dimension);
+  delta.weights = DiffChangedRows<double>(base.weights, next.weights, 1);
+  delta.input_vertex = DiffChangedRows<uint32_t>(base.input_vertex, next.input_vertex, 1);
+  delta.vertex_origins = DiffChangedRows<uint32_t>(base.vertex_origins, next.vertex_origins, 1);
+  delta.vertex_tags = DiffChangedRows<int32_t>(base.vertex_tags, next.vertex_tags, 1);
+  WELLSPACE_RETURN_IF_ERROR(context.Check());
+  WELLSPACE_ASSIGN_OR_RETURN(delta.kept_simplices,
+                             DiffMovedRows(base.simplices, next.simplices, dimension + 1, max_bytes, context));
+  delta.simplex_regions = DiffRegions(base, next, delta.kept_simplices.runs);
+  WELLSPACE_ASSIGN_OR_RETURN(delta.kept_facets, DiffMovedRows(base.facets, next.facets, dimension, max_bytes, context));
+  WELLSPACE_ASSIGN_OR_RETURN(delta.kept_ridges, DiffMovedRows(base.ridges, next.ridges, 2, max_bytes, context));
+  delta.domain_low = next.domain_low;
+  delta.domain_high = next.domain_high;
+  delta.moved_vertices = next.moved_vertices;
+  delta.boundary = next.boundary;
+  delta.regions = next.regions;
+  delta.statistics = next.statistics;
+  return delta.memory_bytes() <= max_bytes ? absl::StatusOr<MeshDelta>(std::move(delta)) : TooLarge(max_bytes);
+}
+
+absl::StatusOr<Mesh> ApplyDelta(const Mesh& base, const MeshDelta& delta) {
+  if (delta.dimension != base.dimension || base.dimension < 1 || delta.base_vertices != base.vertex_count() ||
+      delta.base_simplices != base.simplex_count()) {
+    return Contradiction("it is of one with ", delta.base_vertices, " vertices and ", delta.base_simplices,
+                         " simplices in ", delta.dimension, "-D");
+  }
+  const size_t dimension = base.dimension;
+  Mesh next;
+  next.dimension = base.dimension;
+  next.domain_low = delta.domain_low;
+  next.domain_high = delta.domain_high;
+  next.moved_vertices = delta.moved_vertices;
+  next.boundary = delta.boundary;
+  next.regions = delta.regions;
+  next.statistics = delta.statistics;
+  WELLSPACE_ASSIGN_OR_RETURN(next.points, ApplyChangedRows<double>(base.points, delta.points, dimension));
+  WELLSPACE_ASSIGN_OR_RETURN(next.weights, ApplyChangedRows<double>(base.weights, delta.weights, 1));
+  WELLSPACE_ASSIGN_OR_RETURN(next.input_vertex, ApplyChangedRows<uint32_t>(base.input_vertex, delta.input_vertex, 1));
+  WELLSPACE_ASSIGN_OR_RETURN(next.vertex_origins,
+                             ApplyChangedRows<uint32_t>(base.vertex_origins, delta.vertex_origins, 1));
+  WELLSPACE_ASSIGN_OR_RETURN(next.vertex_tags, ApplyChangedRows<int32_t>(base.vertex_tags, delta.vertex_tags, 1));
+  WELLSPACE_ASSIGN_OR_RETURN(next.simplices, ApplyMovedRows(base.simplices, delta.kept_simplices, dimension + 1));
+  if (next.simplex_count() != delta.simplices || next.vertex_count() != delta.vertices) {
+    return Contradiction("it makes ", next.vertex_count(), " of ", delta.vertices, " vertices and ",
+                         next.simplex_count(), " of ", delta.simplices, " simplices");
+  }
+  WELLSPACE_ASSIGN_OR_RETURN(next.simplex_regions, ApplyRegions(base, delta));
+  WELLSPACE_ASSIGN_OR_RETURN(next.facets, ApplyMovedRows(base.facets, delta.kept_facets, dimension));
+  WELLSPACE_ASSIGN_OR_RETURN(next.ridges, ApplyMovedRows(base.ridges, delta.kept_ridges, 2));
+  if (FingerprintOf(next) != delta.fingerprint) {
+    return Contradiction("the mesh that it makes is not the one that it is of");
+  }
+  return next;
+}
+
+}  // namespace wellspace::core

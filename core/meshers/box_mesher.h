@@ -1,0 +1,68 @@
+// The mesher of the points in a box, in any dimension.
+#ifndef WELLSPACE_CORE_MESHERS_BOX_MESHER_H_
+#define WELLSPACE_CORE_MESHERS_BOX_MESHER_H_
+
+#include <cstdint>
+#include <span>
+#include <type_traits>
+#include <variant>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "core/base/memory/huge_pages.h"
+#include "core/base/run_context.h"
+#include "core/input/near_points.h"
+#include "core/input/sorted_cloud.h"
+#include "core/meshers/mesher.h"
+#include "core/meshers/mesher_of.h"
+#include "core/meshers/point_adder.h"
+#include "core/meshers/repair_log.h"
+#include "core/refine/box_domain.h"
+#include "core/sliver/sliver_stage.h"
+
+namespace wellspace::core {
+
+// Mesher::Create for points alone: merges points that are near each other, and repairs slivers.
+//
+// Thread safety: as Mesher.
+template <int D>
+class BoxMesher final : public MesherOf<BoxDomain<D>> {
+  using Base = MesherOf<BoxDomain<D>>;
+  using Base::frame_, Base::figures_, Base::meshed_box_, Base::numbering_, Base::refinement_, Base::samples_,
+      Base::structure_;
+  using typename Base::Made;
+
+  uint64_t BuildingBytes(const MeshParameters& parameters, const Input& input) const override;
+  absl::Status Build(const MeshParameters& parameters, const Input& input, RunContext& context) override;
+  BoxDomain<D> ToRefine() override { return {}; }
+  AdderOptions Adding() override { return {.merge_distance = merge_distance_, .is_given = &repairs_.is_given()}; }
+  uint64_t OtherBytes() const override;
+  absl::Status CheckFeasibleHere(const MeshParameters& parameters) const override;
+  absl::Status AddToEstimate(const MeshParameters& parameters, const MeshCriteria<D>& criteria,
+                             const RunContext& context, MeshEstimate& estimate) const override;
+  absl::Status Improve(const MeshParameters& parameters, RunContext& context) override;
+  bool MakesAnew(const Mesh& mesh) const override {
+    return MakesByStage() || repairs_.has_moved() || !mesh.weights.empty();
+  }
+  bool MakesByStage() const override;
+  absl::StatusOr<Made> MakeSimplices(int threads, RunContext& context) override;
+  absl::Status Describe(Mesh& mesh, std::span<const uint32_t> faces, int threads,
+                        const RunContext& context) const override;
+  void NoteMade(Mesh& mesh) override;
+  void AddStatistics(const Mesh& mesh, MeshStatistics& statistics, QueryCounters& stars) const override;
+
+  absl::StatusOr<MergedPoints> SetBox(const MeshParameters& parameters, std::span<const double> points,
+                                      const RunContext& context);
+  absl::StatusOr<SortedCloud<D>> SortAndBuild(const MeshParameters& parameters, std::span<const double> points,
+                                              const MergedPoints& merged, const RunContext& context);
+  static double MinDihedralOf(const MeshParameters& parameters);
+
+  [[no_unique_address]] std::conditional_t<(D >= 3), SliverStage<D>, std::monostate> slivers_;
+  bool pumps_ = false;
+  RepairLog repairs_;
+  double merge_distance_ = 0;
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_MESHERS_BOX_MESHER_H_

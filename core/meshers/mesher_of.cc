@@ -1,0 +1,290 @@
+#include "core/meshers/mesher_of.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <utility>
+
+#include "absl/cleanup/cleanup.h"
+#include "absl/strings/str_cat.h"
+#include "core/base/dimensions.h"
+#include "core/base/saturate.h"
+#include "core/base/status_macros.h"
+#include "core/base/stopwatch.h"
+#include "core/base/thread_team.h"
+#include "core/estimate/estimate.h"
+#include "core/input/separation.h"
+#include "core/mesh/mesh_parts.h"
+#include "core/meshers/mesh_estimate.h"
+#include "core/meshers/mesher_checks.h"
+#include "core/meshers/vertex_queries.h"
+#include "core/refine/box_domain.h"
+#include "core/refine/plane/plane_domain.h"
+#include "core/refine/space/space_domain.h"
+#include "core/simplex/quality.h"
+#include "core/validate/validate.h"
+
+namespace wellspace::core {
+namespace {
+
+// Smaller clouds are refined in half a second, unless there are sizes: too soon for a prediction to be of use.
+template <int D>
+constexpr uint64_t kLeastPredicted = D == 2 ? 50'000 : (D == 3 ? 20'000 : 2'000);
+
+}  // namespace
+
+template <typename Kind>
+absl::Status MesherOf<Kind>::Initialize(const MeshParameters& parameters, const Input& input, RunContext& context) {
+  WELLSPACE_RETURN_IF_ERROR(CheckShape(input.points, D));
+  WELLSPACE_RETURN_IF_ERROR(CheckInput(input));
+  context.EnterPhase(Phase::kTree);
+  WELLSPACE_RETURN_IF_ERROR(ReserveForBuilding<D>(parameters, input.points.size() / D, kTreeBytes<D>,
+                                                  BuildingBytes(parameters, input), context));
+  WELLSPACE_RETURN_IF_ERROR(Build(parameters, input, context));
+  refinement_.emplace(structure_, frame_.MinEdge(), ToRefine());
+  adder_.emplace(
+      frame_, structure_, [this](VertexId v) { refinement_->VertexAdded(v); }, numbering_, Adding());
+  context.SetVertices(structure_.vertex_count());
+  figures_.tree_seconds = absl::ToDoubleSeconds(context.TimeIn(Phase::kTree));
+  return absl::OkStatus();
+}
+
+template <typename Kind>
+absl::Status MesherOf<Kind>::BuildTree(const MeshParameters& parameters, const char* what, SortedCloud<D>& cloud,
+                                       std::vector<SegmentLists::Ends> segments, const RunContext& context) {
+  const uint64_t max_vertices = VertexBudget(parameters);
+  const uint64_t corners = segments.empty() ? uint64_t{1} << D : 0;
+  if (cloud.points.size() + corners > max_vertices) {
+    return absl::ResourceExhaustedError(absl::StrCat("the ", cloud.points.size(), " ", what, " are more than ",
+                                                     "max_vertices = ", max_vertices, " vertices; raise max_vertices"));
+  }
+  WELLSPACE_RETURN_IF_ERROR(structure_.Initialize(cloud.grid, std::move(cloud.points),
+                                                  kLeavesPerVertex * max_vertices + (uint64_t{1} << D),
+                                                  parameters.threads, context, std::move(segments)));
+  return CheckSeparation<D>(frame_, structure_, 0, cloud.first_input, parameters.threads, context);
+}
+
+template <typename Kind>
+uint64_t MesherOf<Kind>::memory_bytes() const {
+  return structure_.MemoryBytes() + refinement_->MemoryBytes() + numbering_.MemoryBytes() + samples_.MemoryBytes() +
+         OtherBytes();
+}
+
+template <typename Kind>
+absl::Status MesherOf<Kind>::CheckFeasible(const MeshParameters& parameters) const {
+  WELLSPACE_RETURN_IF_ERROR(CheckParametersIn(parameters, D));
+  return CheckFeasibleHere(parameters);
+}
+
+template <typename Kind>
+absl::Status MesherOf<Kind>::Refine(const MeshParameters& given, RunContext& context) {
+  WELLSPACE_RETURN_IF_ERROR(CheckParametersIn(given, D));
+  WELLSPACE_RETURN_IF_ERROR(CheckDemands(given));
+  context.EnterPhase(Phase::kRefinement);
+  MeshParameters parameters;
+  {
+    const Stopwatch stopwatch(figures_.refinement_seconds, figures_.simplices_seconds);
+    WELLSPACE_ASSIGN_OR_RETURN(parameters, WithSizesOfDomain(given, context));
+    WELLSPACE_RETURN_IF_ERROR(AllowSamples<D>(parameters, samples_, memory_bytes(), context));
+    WELLSPACE_RETURN_IF_ERROR(samples_.Take(frame_, parameters, context));
+    is_refined_ = false;
+    ForgetMade();
+    TakeDemands(parameters);
+    const MeshCriteria<D> criteria = CriteriaOf(parameters);
+    for (bool conforms = false; !conforms;) {
+      WELLSPACE_RETURN_IF_ERROR(
+          Explain(refinement_->Run(criteria, VertexBudget(parameters), parameters.threads, context, nullptr,
+                                   [&] { return PredictVertices(criteria, context); })));
+      WELLSPACE_ASSIGN_OR_RETURN(conforms, Conform(parameters, context));
+    }
+  }
+  WELLSPACE_RETURN_IF_ERROR(Improve(parameters, context));
+  is_refined_ = true;
+  return absl::OkStatus();
+}
+
+// How many vertices a first refinement will end with; 0 if the context knows, or it cannot be said, or it ends too soon
+// to be worth an estimate.
+template <typename Kind>
+absl::StatusOr<uint64_t> MesherOf<Kind>::PredictVertices(const MeshCriteria<D>& criteria,
+                                                         const RunContext& context) const {
+  if (!IsPredictable() || context.estimated_vertices() > 0 || structure_.vertex_count() > structure_.built_count() ||
+      (criteria.sizes.IsUnbounded() && structure_.vertex_count() < kLeastPredicted<D>)) {
+    return 0;
+  }
+  WELLSPACE_ASSIGN_OR_RETURN(const SizeEstimate size,
+                             EstimateSize<D>(structure_, criteria, context, kGlance, planar()));
+  return SaturatedCount(size.vertices);
+}
+
+template <typename Kind>
+absl::StatusOr<std::vector<uint32_t>> MesherOf<Kind>::AddPointsNear(std::span<const double> points,
+                                                                    std::span<const uint32_t> near,
+                                                                    RunContext& context) {
+  if (!points.empty()) {
+    WELLSPACE_RETURN_IF_ERROR(CheckAdding());
+  }
+  const uint32_t count = structure_.vertex_count();
+  absl::StatusOr<std::vector<uint32_t>> vertices = adder_->AddPoints(points, near, context);
+  NoteAdded(count);
+  if (vertices.ok()) {
+    context.SetVertices(structure_.vertex_count());
+  }
+  return vertices;
+}
+
+template <typename Kind>
+absl::StatusOr<uint32_t> MesherOf<Kind>::AddVertex(uint32_t near, std::span<const double> point) {
+  WELLSPACE_RETURN_IF_ERROR(CheckAdding());
+  const uint32_t count = structure_.vertex_count();
+  absl::StatusOr<uint32_t> vertex = adder_->AddVertex(near, point);
+  NoteAdded(count);
+  return vertex;
+}
+
+// Notes the vertices that have been added since there were so many.
+template <typename Kind>
+void MesherOf<Kind>::NoteAdded(uint32_t count_before) {
+  if (structure_.vertex_count() > count_before) {
+    is_refined_ = false;
+    ForgetMade();
+    NoteAddedFrom(count_before);
+  }
+}
+
+template <typename Kind>
+absl::StatusOr<std::vector<double>> MesherOf<Kind>::NearestNeighborDistances(std::span<const uint32_t> vertices) const {
+  return VertexQueries<D>(frame_, structure_, numbering_).NearestNeighborDistances(vertices);
+}
+
+template <typename Kind>
+absl::StatusOr<std::vector<Cell>> MesherOf<Kind>::ClippedCells(std::span<const uint32_t> vertices, double beta) const {
+  return VertexQueries<D>(frame_, structure_, numbering_).ClippedCells(vertices, beta);
+}
+
+template <typename Kind>
+absl::StatusOr<Mesh> MesherOf<Kind>::Extract(int threads, RunContext& context) {
+  WELLSPACE_RETURN_IF_ERROR(CheckRefined(is_refined_, threads));
+  if (!MakesByStage()) {
+    context.EnterPhase(Phase::kSimplices);
+  }
+  ExtendNumbers();
+  Mesh mesh;
+  mesh.dimension = D;
+  mesh.domain_low.assign(meshed_box_.low.begin(), meshed_box_.low.end());
+  mesh.domain_high.assign(meshed_box_.high.begin(), meshed_box_.high.end());
+  absl::StatusOr<HugeVector<double>> points;
+  // By another thread, meanwhile.
+  ThreadTeam team(threads);
+  const absl::Cleanup end = [&team] { team.Drop(); };  // where something is refused
+  team.BeginCall([&] {
+    points = numbering_.PointsFrom(structure_, frame_, 0, context);
+    mesh.input_vertex = numbering_.input_vertex();
+  });
+  WELLSPACE_ASSIGN_OR_RETURN(Made made, MakeSimplices(threads, context));
+  team.End();
+  WELLSPACE_ASSIGN_OR_RETURN(mesh.points, std::move(points));
+  mesh.simplices = std::move(made.simplices.indices);
+  mesh.weights = std::move(made.weights);
+  for (double& weight : mesh.weights) {
+    weight /= frame_.scale * frame_.scale;
+  }
+  mesh.statistics.max_radius_edge = made.simplices.max_radius_edge;
+  mesh.statistics.min_angle_deg = made.simplices.min_angle_deg;
+  WELLSPACE_RETURN_IF_ERROR(Describe(mesh, made.faces, threads, context));
+  figures_.star_queries.Add(made.simplices.counters);
+  context.EnterPhase(Phase::kDone);
+  if (!MakesByStage()) {
+    figures_.simplices_seconds += absl::ToDoubleSeconds(context.TimeIn(Phase::kSimplices));
+  }
+  NoteMade(mesh);
+  Finish(mesh);
+  return mesh;
+}
+
+template <typename Kind>
+absl::Status MesherOf<Kind>::Update(Mesh& mesh, int threads, RunContext& context) {
+  WELLSPACE_RETURN_IF_ERROR(CheckRefined(is_refined_, threads));
+  WELLSPACE_RETURN_IF_ERROR(CheckLastMesh(mesh, D, figures_.extracted_vertices, figures_.extracted_simplices));
+  if (MakesAnew(mesh)) {
+    WELLSPACE_ASSIGN_OR_RETURN(mesh, Extract(threads, context));
+    return absl::OkStatus();
+  }
+  context.EnterPhase(Phase::kSimplices);
+  numbering_.Extend(structure_.vertex_count());
+  WELLSPACE_ASSIGN_OR_RETURN(
+      const std::vector<VertexId> changed,
+      ChangedVertices<D>(structure_, VertexId{static_cast<uint32_t>(figures_.extracted_vertices)}, context));
+  WELLSPACE_ASSIGN_OR_RETURN(
+      const Simplices simplices,
+      ComputeSimplicesAmong<D>(structure_, changed, numbering_.output_index(), threads, context));
+  WELLSPACE_ASSIGN_OR_RETURN(const HugeVector<double> added,
+                             numbering_.PointsFrom(structure_, frame_, figures_.extracted_vertices, context));
+  mesh.points.insert(mesh.points.end(), added.begin(), added.end());
+  std::vector<bool> has_changed(structure_.vertex_count(), false);
+  for (const VertexId v : changed) {
+    has_changed[numbering_.OutputIndex(v)] = true;
+  }
+  const bool worst_has_gone = DropSimplicesAmong<D>(
+      has_changed, [this](uint32_t v) -> const Point<D>& { return structure_.point(numbering_.VertexOf(v)); }, mesh);
+  mesh.simplices.insert(mesh.simplices.end(), simplices.indices.begin(), simplices.indices.end());
+  mesh.input_vertex = numbering_.input_vertex();
+  mesh.moved_vertices.clear();  // else the mesh is extracted anew
+  if (const absl::Status described = Describe(mesh, {}, threads, RunContext()); !described.ok()) {
+    std::abort();  // that context cannot have been cancelled
+  }
+  UpdateQuality(simplices, worst_has_gone, mesh);
+  figures_.star_queries.Add(simplices.counters);
+  context.EnterPhase(Phase::kDone);
+  figures_.simplices_seconds += absl::ToDoubleSeconds(context.TimeIn(Phase::kSimplices));
+  Finish(mesh);
+  return absl::OkStatus();
+}
+
+// Sets the worst shape of the simplices, some of which have been added.
+template <typename Kind>
+void MesherOf<Kind>::UpdateQuality(const Simplices& added, bool worst_has_gone, Mesh& mesh) const {
+  if (worst_has_gone) {
+    const QualityReport report = MeasureQuality({D, mesh.points, mesh.simplices});
+    mesh.statistics.max_radius_edge = report.max_radius_edge;
+    mesh.statistics.min_angle_deg = report.min_angle_deg;
+  } else {
+    mesh.statistics.max_radius_edge = std::max(mesh.statistics.max_radius_edge, added.max_radius_edge);
+    mesh.statistics.min_angle_deg = std::min(mesh.statistics.min_angle_deg, added.min_angle_deg);
+  }
+}
+
+// Notes an extracted mesh, and sets its statistics but for those of its simplices' shapes.
+template <typename Kind>
+void MesherOf<Kind>::Finish(Mesh& mesh) {
+  figures_.NoteMesh(mesh);
+  MeshStatistics& statistics = mesh.statistics;
+  statistics.input_points = numbering_.input_vertex().size();
+  statistics.vertices = mesh.vertex_count();
+  statistics.simplices = mesh.simplex_count();
+  figures_.SetSeconds(statistics);
+  statistics.tree_leaves = structure_.tree().leaf_count();
+  QueryCounters stars = figures_.star_queries;
+  AddStatistics(mesh, statistics, stars);
+  SetQueryFigures(refinement_->counters(), stars, statistics);
+  SetTotals(statistics);
+}
+
+template <typename Kind>
+absl::StatusOr<MeshEstimate> MesherOf<Kind>::Estimate(const MeshParameters& given, const RunContext& context) const {
+  WELLSPACE_RETURN_IF_ERROR(CheckParametersIn(given, D));
+  WELLSPACE_ASSIGN_OR_RETURN(const MeshParameters parameters, WithSizesOfDomain(given, context));
+  WELLSPACE_RETURN_IF_ERROR(AllowSamples<D>(parameters, samples_, memory_bytes(), context));
+  const MeshCriteria<D> criteria = CriteriaOf(parameters);
+  WELLSPACE_ASSIGN_OR_RETURN(MeshEstimate estimate, EstimateMeshOf<D>(structure_, criteria, context, planar()));
+  estimate.memory_bytes += std::max(samples_.MemoryBytes(), ScaledSamples<D>::BytesFor(parameters));
+  WELLSPACE_RETURN_IF_ERROR(AddToEstimate(parameters, criteria, context, estimate));
+  return estimate;
+}
+
+#define WELLSPACE_INSTANTIATE(D) template class MesherOf<BoxDomain<D>>;
+WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
+#undef WELLSPACE_INSTANTIATE
+template class MesherOf<PlaneDomain>;
+template class MesherOf<SpaceDomain>;
+
+}  // namespace wellspace::core

@@ -1,0 +1,148 @@
+// The records of sessions: all that is stored of them but their points and meshes. One change is made at a time.
+#ifndef WELLSPACE_SERVER_STORE_RECORDS_H_
+#define WELLSPACE_SERVER_STORE_RECORDS_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "wellspace/store/v1/records.pb.h"
+
+namespace wellspace::server {
+
+// A set of sizes at points, which a session has, or has had for a step that is taken again by Replay.
+struct StoredSizes {
+  // Parts that are made when they are written down, one after the other, so that they are never held together.
+  struct InTurn {
+    size_t count = 0;
+    uint64_t bytes = 0;  // of all, about
+    std::function<store::v1::SizesRecord(size_t)> make{};
+  };
+
+  uint64_t number = 0;  // of those of its session; above 0
+  std::vector<store::v1::SizesRecord> parts;
+  InTurn in_turn{};  // come behind `parts`; none of a set that was read
+};
+
+// The parts of one change of a session: all of them are made, or none.
+//
+// Epochs: a process that takes a session over from its owner gets its epoch, a number that none had before. A change
+//         has the epoch of its owner, and is made only while the session is still at it. So an owner that was stopped,
+//         and goes on when another has the session, can change nothing. Files have the epoch in their names, so that no
+//         two owners write one.
+struct SessionChange {
+  std::string session;                                   // its name
+  uint64_t epoch = 0;                                    // of the owner that changes it
+  bool is_creation = false;                              // the session is new
+  std::optional<store::v1::SessionRecord> state{};       // the new record; none: as before
+  std::vector<store::v1::StepRecord> steps{};            // come behind those that there are
+  std::vector<store::v1::OperationRecord> operations{};  // new, or in the place of those of their numbers
+  std::vector<uint64_t> dropped_operations{};            // their numbers
+  std::optional<StoredSizes> sizes{};                    // a new set
+  std::vector<uint64_t> dropped_sizes{};                 // the numbers of sets
+  std::optional<store::v1::AnswerRecord> answer{};       // to the request that has made the change
+  bool is_deletion = false;                              // of the session and all that it has
+};
+
+// A request_id of a tenant.
+struct AnswerKey {
+  std::string tenant;
+  std::string request_id;
+};
+
+// A session as it was written down. Its features and sizes are read when they are needed (Records::ReadFeatures,
+// ReadSizes).
+struct StoredSession {
+  uint64_t epoch = 0;  // at which the session is
+  store::v1::SessionRecord state;
+  std::vector<store::v1::StepRecord> steps;            // all but those of features, in their order
+  std::vector<store::v1::OperationRecord> operations;  // ascending by number
+};
+
+// All sessions and answers that are stored.
+struct StoredSessions {
+  std::vector<StoredSession> sessions;  // in the order of their creation
+  std::vector<store::v1::AnswerRecord> answers;
+};
+
+// The records of all sessions, of all owners; and the owners whose files may still come to be named.
+struct Census {
+  std::vector<store::v1::SessionRecord> sessions;
+  uint64_t oldest_epoch = 0;  // of the owners that there are: those at epochs before it are no more
+};
+
+// Where the points of a session are: SessionRecord.points_files, also of a record that is older than these.
+std::vector<store::v1::PointsFile> PointsFilesOf(const store::v1::SessionRecord& record);
+
+// The error of Records::Apply if the request that the change answers was answered before; whether a status is it.
+absl::Status AnsweredBefore(const std::string& request_id);
+inline bool IsAnsweredBefore(const absl::Status& status) { return absl::IsAlreadyExists(status); }
+
+// The error of Records::Apply if the change is not the session's owner's; whether a status is it.
+absl::Status OwnedElsewhere(const std::string& session);
+inline bool IsOwnedElsewhere(const absl::Status& status) { return absl::IsAborted(status); }
+
+// The worst event that a change is to outlive once it is made.
+enum class Survives { kPowerLoss, kProcessDeath };
+
+// The records of sessions. Records that are not durable (MemoryRecords) end with the process.
+//
+// Thread safety: thread-safe. Changes of one session are applied one after the other by its caller; those of several
+//                sessions at once, which cost one synchronisation of the disk together.
+// Errors:        of functions that read: DATA_LOSS, naming the file; STORE_FAILED; INTERNAL.
+class Records {
+ public:
+  virtual ~Records() = default;
+
+  // Whether anything outlives the process.
+  virtual bool is_durable() const = 0;
+
+  // The epoch of the sessions that this process creates, and of those that it has taken over when it began.
+  virtual uint64_t epoch() const = 0;
+
+  // The stored sessions that this process owns, and the answers, at the start. To be called once, before all others.
+  virtual absl::StatusOr<StoredSessions> Load() = 0;
+
+  // Takes a session over from its owner; none: there is no such session. Changes that the former owner has not made by
+  // now fail.
+  //
+  // Errors:     DISK_FULL.
+  virtual absl::StatusOr<std::optional<StoredSession>> Take(const std::string& session) = 0;
+
+  // Applies `change`. The files that it names have been synchronised before.
+  //
+  // Errors:     ABORTED: the session is at another epoch, or another owner has deleted it. ALREADY_EXISTS: the request
+  //             that it answers was answered before, by any process. DISK_FULL; STORE_FAILED: nothing can be written
+  //             any more. Nothing has changed.
+  virtual absl::Status Apply(const SessionChange& change, Survives survives) = 0;
+
+  // The answer to a request; none: it was not answered, or the answer was dropped.
+  virtual absl::StatusOr<std::optional<store::v1::AnswerRecord>> FindAnswer(const AnswerKey& request) = 0;
+
+  // Drops answers that need not be kept any longer, with one of the next changes.
+  virtual void Forget(std::span<const AnswerKey> answers) = 0;
+
+  // The segments and seeds of a session, step by step.
+  virtual absl::StatusOr<std::vector<store::v1::StepRecord::Features>> ReadFeatures(const std::string& session) = 0;
+
+  // The sets of sizes of a session, ascending by number.
+  virtual absl::StatusOr<std::vector<StoredSizes>> ReadSizes(const std::string& session) = 0;
+
+  // The record of a session; none: there is no such session, or none is kept.
+  virtual absl::StatusOr<std::optional<store::v1::SessionRecord>> ReadRecord(const std::string& session) = 0;
+
+  // Those of all sessions, of all owners, in the order of their creation.
+  //
+  // Errors:     ABORTED: this process owns nothing any more.
+  virtual absl::StatusOr<Census> ReadCensus() = 0;
+};
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_STORE_RECORDS_H_
