@@ -11,9 +11,9 @@ declare -A packages=(
   [build]="g++ cmake ninja-build pkg-config libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
            libabsl-dev libc-ares-dev libspdlog-dev libboost-dev libtbb-dev libcli11-dev nlohmann-json3-dev
            prometheus-cpp-dev libcairo2-dev libmetis-dev libmicrohttpd-dev zlib1g-dev liblzma-dev libminizip-dev libhdf5-dev
-           libsqlite3-dev python3"
+           libsqlite3-dev libpqxx-dev python3"
   [test]="libgtest-dev libgmock-dev libcgal-dev libeigen3-dev python3 python3-grpcio python3-meshio python3-numpy openssl
-          metis python3-protobuf python3-scipy python3-tqdm libisal2 mypy
+          metis postgresql-15 python3-protobuf python3-scipy python3-tqdm libisal2 mypy
           python3-build python3-pip python3-setuptools python3-venv python3-wheel"
   [interoperability]="gmsh freefem++ python3-gmsh python3-h5py python3-meshio python3-vtk9 python3-numpy fish zsh"
   [solvers]="calculix-ccx openfoam python3-dolfinx python3-mpi4py python3-petsc4py"
@@ -28,7 +28,7 @@ declare -A packages=(
   [monitoring]="prometheus"
   [kubernetes]="kubernetes-client"
   [runtime]="libgrpc++1.51 libprotobuf32 libabsl20220623 libspdlog1.10 libtbb12 libprometheus-cpp-core1.0 libcairo2 libmetis5 libmicrohttpd12 zlib1g
-             libminizip1 liblzma5 libsz2 libsqlite3-0"
+             libminizip1 liblzma5 libsz2 libsqlite3-0 libpqxx-6.4"
 )
 packages[dev]="${packages[build]} ${packages[test]} ${packages[lint]} ${packages[tidy]} ${packages[fuzz]}"
 

@@ -45,7 +45,15 @@ Backend::Backend(const ServiceOptions& options, const Authenticator& authenticat
       session_log_(std::move(session_log)),
       request_ids_(drive.clock.since_boot, session_log_->records()),
       memory_(options_.max_memory_bytes),
-      sessions_(options_, memory_, drive.clock, *session_log_, drive.make_session_name),
+      sessions_(
+          options_, memory_, drive.clock, *session_log_, drive.make_session_name,
+          [this](const std::string& tenant, const std::string& name) { return other_owners_.Find(tenant, name); }),
+      other_owners_(
+          session_log_->records(), [this](std::vector<StoredSession> taken) { return TakeInOfOthers(taken); },
+          [this](const std::string& name) {
+            const std::shared_ptr<Session> session = sessions_.FindHere(name);
+            return session != nullptr && !session->IsElsewhere();
+          }),
       idle_sessions_(sessions_, memory_, observability.work()),
       environment_{.options = options_,
                    .mesher = mesher_,
@@ -116,19 +124,7 @@ absl::Status Backend::Restore() {
   request_ids_.Restore(std::move(stored.answers));
   std::vector<ResumedOperation> resumed;
   for (const StoredSession& one : stored.sessions) {
-    absl::StatusOr<std::shared_ptr<Session>> session = sessions_.Restore(one);
-    if (!session.ok()) {  // others are not to suffer from it
-      log_->error(LogFields()
-                      .Add("event", "session_not_restored")
-                      .Add("session", one.state.name())
-                      .Add("error", std::string(session.status().message()))
-                      .text());
-      continue;
-    }
-    WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Operation> operation, (*session)->ResumeOperation());
-    if (operation != nullptr) {
-      resumed.push_back({.session = *std::move(session), .operation = std::move(operation)});
-    }
+    WELLSPACE_RETURN_IF_ERROR(TakeIn(one, resumed));
   }
   if (session_log_->is_durable()) {
     log_->info(LogFields()
@@ -141,11 +137,58 @@ absl::Status Backend::Restore() {
   if (session_log_->is_durable()) {
     RemoveGarbage();
   }
+  other_owners_.Start();
   return absl::OkStatus();
 }
 
-// Its tasks give work to the others.
-Backend::~Backend() { background_.Stop(); }
+absl::Status Backend::TakeIn(const StoredSession& stored, std::vector<ResumedOperation>& resumed) {
+  absl::StatusOr<std::shared_ptr<Session>> session = sessions_.Restore(stored);
+  if (!session.ok()) {  // others are not to suffer from it
+    log_->error(LogFields()
+                    .Add("event", "session_not_restored")
+                    .Add("session", stored.state.name())
+                    .Add("error", std::string(session.status().message()))
+                    .text());
+    return absl::OkStatus();
+  }
+  absl::StatusOr<std::shared_ptr<Operation>> operation = (*session)->ResumeOperation();
+  if (!operation.ok()) {
+    sessions_.Remove(**session);
+    return operation.status();
+  }
+  if (*operation != nullptr) {
+    resumed.push_back({.session = *std::move(session), .operation = *std::move(operation)});
+  }
+  return absl::OkStatus();
+}
+
+std::vector<std::string> Backend::TakeInOfOthers(const std::vector<StoredSession>& stored) {
+  std::vector<std::string> left;
+  std::vector<ResumedOperation> resumed;
+  for (const StoredSession& one : stored) {
+    if (const absl::Status taken_in = TakeIn(one, resumed); !taken_in.ok()) {
+      log_->warn(LogFields()
+                     .Add("event", "session_not_taken_over")
+                     .Add("session", one.state.name())
+                     .Add("error", std::string(taken_in.message()))
+                     .text());
+      left.push_back(one.state.name());
+    }
+  }
+  log_->info(LogFields()
+                 .Add("event", "taken_over")
+                 .Add("sessions", static_cast<uint64_t>(stored.size() - left.size()))
+                 .Add("operations", static_cast<uint64_t>(resumed.size()))
+                 .text());
+  ResumeRefinements(environment_, std::move(resumed));
+  return left;
+}
+
+// Their tasks give work to the others.
+Backend::~Backend() {
+  other_owners_.Stop();
+  background_.Stop();
+}
 
 void Backend::RemoveExpired() {
   std::vector<SessionChange> unlogged;

@@ -21,6 +21,8 @@
 #include "server/observability/observability.h"
 #include "server/security/authenticator.h"
 #include "server/sessions/idle_sessions.h"
+#include "server/sessions/other_owners.h"
+#include "server/sessions/refinement.h"
 #include "server/sessions/session_registry.h"
 #include "server/store/session_log.h"
 #include "spdlog/logger.h"
@@ -51,6 +53,9 @@ class Backend {
   // Errors:     as of Records::Load and Apply.
   absl::Status Restore();
 
+  // Takes nothing over from other servers any more.
+  void StopTakingOver() { other_owners_.Stop(); }
+
   // Operations whose work has not ended are the next process's, if the session log is durable.
   ~Backend();
 
@@ -65,6 +70,12 @@ class Backend {
   void RemoveExpired();
   // Writes down that sessions are no more which have expired when the disk had no room for it.
   void LogExpiries(const std::vector<SessionChange>& deletions);
+  // Takes a session in, and adds its operation that has not ended to `resumed`.
+  //
+  // Errors:     those of Session::ResumeOperation: it has not been taken in.
+  absl::Status TakeIn(const StoredSession& stored, std::vector<ResumedOperation>& resumed);
+  // As OtherOwners::TakeIn.
+  std::vector<std::string> TakeInOfOthers(const std::vector<StoredSession>& stored);
   void RemoveGarbage();
   void AddMetrics(Metrics& metrics);
 
@@ -78,6 +89,7 @@ class Backend {
   RequestIds request_ids_;
   MemoryBudget memory_;
   SessionRegistry sessions_;
+  OtherOwners other_owners_;
   std::mutex unlogged_mutex_;
   std::vector<SessionChange> unlogged_;  // deletions of sessions that have expired, still to be made; guarded by it
   const IdleSessions idle_sessions_;

@@ -24,6 +24,7 @@
 #include <thread>
 
 #include "CLI/CLI.hpp"
+#include "absl/strings/str_cat.h"
 #include "absl/time/time.h"
 #include "server/base/descriptor_limit.h"
 #include "server/base/options.h"
@@ -41,6 +42,8 @@
 #include "server/store/back_up.h"
 #include "server/store/check_data.h"
 #include "server/store/durable_log.h"
+#include "server/store/postgres_options.h"
+#include "server/store/shared_log.h"
 
 namespace wellspace::server {
 namespace {
@@ -50,6 +53,8 @@ constexpr int kExitWrongOptions = 2;
 // is resident.
 constexpr int kReturnedBytes = 2 * kMaxResponseBytes;
 constexpr absl::Duration kMaxGrace = absl::Hours(24);
+constexpr absl::Duration kLeastLease = absl::Seconds(1);
+constexpr absl::Duration kMostLease = absl::Minutes(10);
 
 struct Flags {
   ServerOptions server;
@@ -57,7 +62,8 @@ struct Flags {
   std::string log_level = "info";
   std::string log_format = "text";
   std::string data;           // the folder of the session log; empty: sessions end with the process
-  bool is_ephemeral = false;  // they do, whatever `data` says
+  PostgresOptions store;      // of its records, in the place of a database in the folder; no address: none
+  bool is_ephemeral = false;  // sessions end with the process, whatever stands above
   bool checks_configuration = false;
   std::string hash_for_tenant;  // makes a line of tokens and does not serve
   std::string checked_folder;   // checks it and does not serve
@@ -81,6 +87,31 @@ void DeclareSecurity(CLI::App& app, SecurityOptions& security) {
                "Allow to listen in plain text, or without authentication, where other machines can connect");
 }
 
+void DeclareStore(CLI::App& app, Flags& flags) {
+  app.add_option("--data", flags.data,
+                 "Folder in which sessions are kept, so that they outlive this process; default: none, and they end "
+                 "with it")
+      ->type_name("DIR");
+  app.add_option("--store", flags.store.address,
+                 "PostgreSQL database that servers share: it has the records of sessions, and the folder of --data, "
+                 "which they share, too, points and meshes; default: the records are in that folder, of one server")
+      ->type_name("postgresql://…")
+      ->check([](const std::string& address) -> std::string {
+        const absl::Status status = ShownPostgresAddress(address).status();
+        return status.ok() ? "" : std::string(status.message());
+      });
+  app.add_option("--replica", flags.store.owner,
+                 "Name of this server among those that share a --store; default: that of the machine")
+      ->type_name("NAME");
+  app.add_option("--advertise", flags.server.advertise,
+                 "Address by which clients reach this server, told to those that ask another one of the --store for "
+                 "its sessions; default: that of --listen, by the name of the machine where it listens everywhere")
+      ->type_name("HOST:PORT");
+  AddSeconds(app, "--lease", flags.store.lease, kLeastLease, kMostLease,
+             "Time after which others take over the sessions of a server that is not heard of at the --store");
+  app.add_flag("--ephemeral", flags.is_ephemeral, "Keep no session, also where the file of options has a folder");
+}
+
 void Declare(CLI::App& app, Flags& flags) {
   app.set_version_flag("--version", std::string("wellspaced ") + kVersion);
   app.add_option("--listen", flags.server.listen, "Address to listen on; port 0 takes a free one")
@@ -89,11 +120,7 @@ void Declare(CLI::App& app, Flags& flags) {
   DeclareSecurity(app, flags.server.security);
   DeclareLimits(app, flags.server.service);
   DeclareConnections(app, flags.server.connections);
-  app.add_option("--data", flags.data,
-                 "Folder in which sessions are kept, so that they outlive this process; default: none, and they end "
-                 "with it")
-      ->type_name("DIR");
-  app.add_flag("--ephemeral", flags.is_ephemeral, "Keep no session, also where the file of options has a folder");
+  DeclareStore(app, flags);
   AddSeconds(app, "--grace", flags.grace, absl::ZeroDuration(), kMaxGrace,
              "Time that running work gets to end after SIGTERM or SIGINT");
   app.add_option("--log-level", flags.log_level, "What to log on standard error")
@@ -130,6 +157,9 @@ void Declare(CLI::App& app, Flags& flags) {
       ->required();
 }
 
+// Whether sessions are shared with other servers.
+bool IsShared(const Flags& flags) { return !flags.store.address.empty() && !flags.is_ephemeral; }
+
 // The log's line about a server that has just started: its addresses and its limits, given or not.
 LogFields StartOf(const Flags& flags, const Server& server) {
   const ServiceOptions& service = flags.server.service;
@@ -159,6 +189,10 @@ LogFields StartOf(const Flags& flags, const Server& server) {
   fields.Add("max_streams", count(connections.calls.max_streams));
   fields.Add("max_calls", count(connections.calls.max_calls));
   fields.Add("data", flags.is_ephemeral ? "" : flags.data);
+  if (IsShared(flags)) {
+    fields.Add("store", ShownPostgresAddress(flags.store.address).value_or(""));
+    fields.Add("replica", flags.store.owner).Add("lease_seconds", absl::ToDoubleSeconds(flags.store.lease));
+  }
   return fields.Add("grace_seconds", absl::ToDoubleSeconds(flags.grace));
 }
 
@@ -203,6 +237,14 @@ int Report(const std::string& folder, const absl::StatusOr<DataReport>& report) 
   return report->is_whole() ? exit : 1;
 }
 
+// Whether what belongs to --store is there, too.
+absl::Status CheckStore(const Flags& flags) {
+  return IsShared(flags) && flags.data.empty()
+             ? absl::InvalidArgumentError(
+                   "--store wants --data, too: the folder of points and meshes, which all servers of the store share")
+             : absl::OkStatus();
+}
+
 // Prints the options in force. The exit code is 0 if a server could start with them, as far as that can be told
 // without listening or opening the folder of sessions.
 int CheckConfiguration(const CLI::App& app, const Flags& flags, int argc, const char* const* argv) {
@@ -229,6 +271,12 @@ absl::StatusOr<std::unique_ptr<SessionLog>> OpenSessionLog(const Flags& flags,
     log->flush();
     _exit(1);
   };
+  if (IsShared(flags)) {
+    return OpenSharedLog({.folder = flags.data,
+                          .database = flags.store,
+                          .on_failure = on_failure,
+                          .max_written_files = MaxWrittenFiles(DescriptorLimit())});
+  }
   return OpenDurableLog({.folder = flags.data,
                          .on_failure = on_failure,
                          .ballast_bytes = BallastBytesFor(flags.data),
@@ -302,6 +350,20 @@ std::optional<int> Parse(CLI::App& app, int argc, char** argv) {
   return std::nullopt;
 }
 
+// Runs what does not serve, if it is asked for. An exit code: the process is to end with it.
+std::optional<int> RunCommand(const Flags& flags) {
+  if (!flags.hash_for_tenant.empty()) {
+    return HashToken(flags.hash_for_tenant);
+  }
+  if (!flags.checked_folder.empty()) {
+    return Report(flags.checked_folder, CheckData(flags.checked_folder));
+  }
+  if (!flags.copied_folder.empty()) {
+    return Report(flags.copy, BackUp(flags.copied_folder, flags.copy));
+  }
+  return std::nullopt;
+}
+
 int Main(int argc, char** argv) {
   signal(SIGXFSZ, SIG_IGN);  // a file that must not grow further is a full disk
   Flags flags;
@@ -316,17 +378,18 @@ int Main(int argc, char** argv) {
   if (const std::optional<int> exit = Parse(app, argc, argv); exit.has_value()) {
     return *exit;
   }
+  if (flags.store.owner.empty()) {
+    flags.store.owner = NameOfMachine();
+  }
+  if (const absl::Status status = CheckStore(flags); !status.ok()) {
+    std::cerr << "wellspaced: " << status.message() << std::endl;
+    return flags.checks_configuration ? 1 : kExitWrongOptions;
+  }
   if (flags.checks_configuration) {
     return CheckConfiguration(app, flags, argc, argv);
   }
-  if (!flags.hash_for_tenant.empty()) {
-    return HashToken(flags.hash_for_tenant);
-  }
-  if (!flags.checked_folder.empty()) {
-    return Report(flags.checked_folder, CheckData(flags.checked_folder));
-  }
-  if (!flags.copied_folder.empty()) {
-    return Report(flags.copy, BackUp(flags.copied_folder, flags.copy));
+  if (const std::optional<int> exit = RunCommand(flags); exit.has_value()) {
+    return *exit;
   }
 
   BoundHeaps(resources);
@@ -339,7 +402,9 @@ int Main(int argc, char** argv) {
   const GrpcLog grpc_log(log);
   absl::StatusOr<std::unique_ptr<SessionLog>> session_log = OpenSessionLog(flags, log);
   if (!session_log.ok()) {
-    std::cerr << "wellspaced: --data " << flags.data << ": " << session_log.status().message() << std::endl;
+    const std::string store =
+        IsShared(flags) ? absl::StrCat(" --store ", ShownPostgresAddress(flags.store.address).value_or("")) : "";
+    std::cerr << "wellspaced: --data " << flags.data << store << ": " << session_log.status().message() << std::endl;
     return 1;
   }
   absl::StatusOr<std::unique_ptr<Server>> server = Server::Start(flags.server, log, *std::move(session_log));

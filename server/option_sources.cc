@@ -50,8 +50,14 @@ std::string SourceOf(const CLI::Option& option, int count, const char* const* ar
   return option.count() > 0 ? "file" : "default";
 }
 
-// The value without the password of an address.
-std::string WithoutPassword(const std::string& value) {
+// The value without the passwords of an address: that of the user, and those behind a question mark.
+std::string WithoutPassword(std::string value) {
+  const size_t query = value.find("://") == std::string::npos ? std::string::npos : value.find('?');
+  for (size_t at = value.find("password=", query); query != std::string::npos && at != std::string::npos;
+       at = value.find("password=", at + 1)) {
+    const size_t begin = value.find('=', at) + 1;
+    value.replace(begin, std::min(value.find('&', begin), value.size()) - begin, "***");
+  }
   const size_t scheme = value.find("://");
   if (scheme == std::string::npos) {
     return value;

@@ -17,6 +17,7 @@
 #include "grpcpp/server_builder.h"
 #include "grpcpp/server_posix.h"
 #include "server/base/clock.h"
+#include "server/base/resources.h"
 #include "server/network/compression.h"
 #include "server/network/listen_address.h"
 #include "server/store/session_log.h"
@@ -51,6 +52,14 @@ constexpr int kMostReadAtOnce = 16 * 1024;
 // As gRPC takes durations.
 int Milliseconds(absl::Duration duration) {
   return static_cast<int>(std::min<int64_t>(absl::ToInt64Milliseconds(duration), std::numeric_limits<int>::max()));
+}
+
+// The address for others of a server that listens at `address`.
+std::string AddressForOthers(ListenAddress address) {
+  if (address.host == "0.0.0.0" || address.host == "::") {
+    address.host = NameOfMachine();
+  }
+  return address.ToString();
 }
 
 // gRPC keeps these settings for the whole process.
@@ -109,6 +118,10 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& optio
     session_log = MakeEphemeralLog();
   }
   const bool keeps_files = session_log->is_durable();
+  if (listener != nullptr) {
+    WELLSPACE_RETURN_IF_ERROR(
+        session_log->records().Announce(options.advertise.empty() ? AddressForOthers(address) : options.advertise));
+  }
   std::unique_ptr<Server> server(new Server(options, std::move(security), std::move(log), std::move(session_log),
                                             std::move(mesher), std::move(estimator), std::move(create_mesher)));
   WELLSPACE_RETURN_IF_ERROR(server->observability_.ListenForHttp(options.observability));
@@ -182,6 +195,7 @@ void Server::Shutdown(absl::Duration grace) {
     observability_.SetReadiness(Readiness::kStopping);
     server_->GetHealthCheckService()->SetServingStatus(false);
     backend_.calls().Close();
+    backend_.StopTakingOver();
     const absl::Duration end = SinceBoot() + grace;
     // Unwatched work gets to its end, too.
     if (!backend_.calls().WaitUntilEmpty(grace) || !backend_.jobs().WaitUntilIdle(end - SinceBoot())) {

@@ -35,7 +35,9 @@ struct ConnectionOptions {
 };
 
 struct ServerOptions {
-  std::string listen;  // HOST:PORT, port 0 takes a free one; empty: no listener
+  std::string listen;     // HOST:PORT, port 0 takes a free one; empty: no listener
+  std::string advertise;  // HOST:PORT by which others reach it; empty: as it listens, by the name of the machine
+                          // where that is every address
   ConnectionOptions connections;
   ServiceOptions service;
   SecurityOptions security;

@@ -1,6 +1,8 @@
 #include "server/base/resources.h"
 
+#include <limits.h>
 #include <sys/sysinfo.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -127,6 +129,11 @@ Resources ReadResources(const std::string& root) {
 
 uint64_t DefaultMaxMemory(const Resources& resources) {
   return resources.memory_bytes == 0 ? 0 : std::max(resources.memory_bytes / 4 * 3, kMinMemoryBytes);
+}
+
+std::string NameOfMachine() {
+  char name[HOST_NAME_MAX + 1] = {};
+  return gethostname(name, sizeof(name)) == 0 ? name : "localhost";
 }
 
 }  // namespace wellspace::server

@@ -23,6 +23,9 @@ Resources ReadResources(const std::string& root = "");
 // no limit, when that is not known.
 uint64_t DefaultMaxMemory(const Resources& resources);
 
+// The name by which other machines know this one, as far as the system knows.
+std::string NameOfMachine();
+
 }  // namespace wellspace::server
 
 #endif  // WELLSPACE_SERVER_BASE_RESOURCES_H_

@@ -6,9 +6,16 @@
 
 namespace wellspace::server {
 
-absl::Status Elsewhere(const std::string& session) {
-  return MakeError(v1::ERROR_REASON_SESSION_ELSEWHERE,
-                   absl::StrCat(session, " has been taken over by another server; ask that one"));
+absl::Status Elsewhere(const std::string& session, const std::string& address) {
+  return SessionElsewhereError(address.empty()
+                                   ? absl::StrCat(session, " has been taken over by another server; ask that one")
+                                   : absl::StrCat(session, " is at another server, ", address, "; ask that one"),
+                               address);
+}
+
+absl::Status NoSuchSession(const std::string& session) {
+  return MakeError(v1::ERROR_REASON_SESSION_NOT_FOUND,
+                   absl::StrCat("there is no ", session, "; it may have been deleted, or have expired"));
 }
 
 absl::Status CheckOpen(const Occupancy& occupancy, const std::string& session) {

@@ -49,8 +49,10 @@ inline bool HasNoQueries(Occupancy* occupancy) { return occupancy->queries == 0;
 //
 // Errors:     SESSION_NOT_FOUND, SESSION_ELSEWHERE.
 absl::Status CheckOpen(const Occupancy& occupancy, const std::string& session);
-// The error of every call to a session that another server owns.
-absl::Status Elsewhere(const std::string& session);
+// The error of every call to a session that another server owns. `address`: that server's; empty: unknown.
+absl::Status Elsewhere(const std::string& session, const std::string& address = "");
+// The error of every call to a session that does not exist, or is another tenant's.
+absl::Status NoSuchSession(const std::string& session);
 // CheckOpen; also refuses requests that have to wait for the work that has the session.
 //
 // Errors:     SESSION_NOT_FOUND, SESSION_BUSY.

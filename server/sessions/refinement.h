@@ -33,7 +33,7 @@ struct ResumedOperation {
   std::shared_ptr<Operation> operation;
 };
 
-// Has the work of these done again. To be called once, at the start.
+// Has the work of these done again: at the start, and when sessions were taken over.
 void ResumeRefinements(const CallEnvironment& environment, std::vector<ResumedOperation> resumed);
 
 // Ends an operation that waits; has one that runs end soon.

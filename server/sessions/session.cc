@@ -161,11 +161,15 @@ absl::Status Session::Commit(const SessionChange& change, Survives survives) {
   if (!IsOwnedElsewhere(committed)) {
     return committed;
   }
+  NoteElsewhere();
+  return Elsewhere(name());
+}
+
+void Session::NoteElsewhere() {
   absl::MutexLock lock(&mutex_);
   occupancy_.is_elsewhere = true;
   occupancy_.is_closed = true;
   account_.Close();
-  return Elsewhere(name());
 }
 
 std::shared_ptr<const SessionState> Session::state() const {

@@ -104,6 +104,8 @@ class Session {
   bool Renew();
   // Whether another server has taken the session over, so that this one has nothing to say of it.
   bool IsElsewhere() const;
+  // From now on it is.
+  void NoteElsewhere();
   // A session with a SessionUse, or with an operation under way, does not expire.
   bool IsExpired() const;
 

@@ -24,8 +24,13 @@ std::string UnguessableSessionName() {
 }
 
 SessionRegistry::SessionRegistry(const ServiceOptions& options, MemoryBudget& memory, Clock clock, SessionLog& log,
-                                 std::function<std::string()> make_name)
-    : options_(options), memory_(memory), clock_(std::move(clock)), log_(log), make_name_(std::move(make_name)) {}
+                                 std::function<std::string()> make_name, FindElsewhere find_elsewhere)
+    : options_(options),
+      memory_(memory),
+      clock_(std::move(clock)),
+      log_(log),
+      make_name_(std::move(make_name)),
+      find_elsewhere_(std::move(find_elsewhere)) {}
 
 absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Create(NewSession settings,
                                                                  const AnswerTo<v1::Session>& answer) {
@@ -84,6 +89,10 @@ absl::Status SessionRegistry::TakePlace(const std::string& tenant_name, std::sha
 }
 
 absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Restore(const StoredSession& stored) {
+  if (const std::shared_ptr<Session> before = FindHere(stored.state.name()); before != nullptr) {
+    before->NoteElsewhere();
+    Remove(*before);
+  }
   std::shared_ptr<TenantPoints> points;
   {
     std::lock_guard lock(mutex_);
@@ -109,23 +118,24 @@ void SessionRegistry::DropIfEmpty(const std::string& tenant) {
   }
 }
 
+std::shared_ptr<Session> SessionRegistry::FindHere(const std::string& name) const {
+  std::lock_guard lock(mutex_);
+  const auto found = by_name_.find(name);
+  return found == by_name_.end() ? nullptr : found->second;
+}
+
 absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Find(const std::string& tenant, const std::string& name) {
-  std::shared_ptr<Session> session;
-  {
-    std::lock_guard lock(mutex_);
-    if (const auto found = by_name_.find(name); found != by_name_.end()) {
-      session = found->second;
-    }
+  WELLSPACE_RETURN_IF_ERROR(log_.records().CheckOwnership());
+  std::shared_ptr<Session> session = FindHere(name);
+  if (find_elsewhere_ != nullptr && (session == nullptr || session->IsElsewhere())) {
+    WELLSPACE_RETURN_IF_ERROR(find_elsewhere_(tenant, name));
+    session = FindHere(name);
   }
   const bool is_own = session != nullptr && session->tenant() == tenant;
   if (is_own && session->IsElsewhere()) {
     return Elsewhere(name);
   }
-  if (!is_own || !session->Renew()) {
-    return MakeError(v1::ERROR_REASON_SESSION_NOT_FOUND,
-                     absl::StrCat("there is no ", name, "; it may have been deleted, or have expired"));
-  }
-  return session;
+  return is_own && session->Renew() ? absl::StatusOr<std::shared_ptr<Session>>(session) : NoSuchSession(name);
 }
 
 std::vector<std::shared_ptr<Session>> SessionRegistry::List(const std::string& tenant, absl::Time after, size_t count,

@@ -39,17 +39,24 @@ std::string UnguessableSessionName();
 //             used again, and cannot be guessed.
 class SessionRegistry {
  public:
+  // Asked, without a lock, for a session that is not here. OK: it has been taken in meanwhile (Restore). Errors: those
+  // of Find.
+  using FindElsewhere = std::function<absl::Status(const std::string& tenant, const std::string& name)>;
+
   // REQUIRES:   `options`, `memory` and `log` outlive this and all sessions.
-  // `make_name` makes the names of new sessions, no two the same; another one is for tests.
+  // `make_name` makes the names of new sessions, no two the same; another one is for tests. `find_elsewhere`: null,
+  // where no other process shares the log.
   SessionRegistry(const ServiceOptions& options, MemoryBudget& memory, Clock clock, SessionLog& log,
-                  std::function<std::string()> make_name = UnguessableSessionName);
+                  std::function<std::string()> make_name = UnguessableSessionName,
+                  FindElsewhere find_elsewhere = nullptr);
 
   // Makes a session without points, and has it written down.
   //
   // Errors:     QUOTA_EXCEEDED (the tenant's sessions), TOO_MANY_SESSIONS (the server's); DISK_FULL, STORE_FAILED.
   absl::StatusOr<std::shared_ptr<Session>> Create(NewSession settings, const AnswerTo<v1::Session>& answer = nullptr);
 
-  // Takes a session in that was written down before the server was started, whatever the limits are now.
+  // Takes a session in that another process has had, or this one before it was restarted, whatever the limits are now.
+  // One of its name that was here is closed: it is another server's, or was before this.
   //
   // Errors:     those of Session::Restore.
   absl::StatusOr<std::shared_ptr<Session>> Restore(const StoredSession& stored);
@@ -57,8 +64,11 @@ class SessionRegistry {
   // The session `name` of `tenant`, its lease renewed.
   //
   // Errors:     SESSION_NOT_FOUND: there is none, it has expired, or it is another tenant's. SESSION_ELSEWHERE: another
-  //             server has taken it over.
+  //             server has it. STORE_FAILED: it cannot be found out now who has it.
   absl::StatusOr<std::shared_ptr<Session>> Find(const std::string& tenant, const std::string& name);
+
+  // The session `name`, whosever it is, as it is. Null: it is not here.
+  std::shared_ptr<Session> FindHere(const std::string& name) const;
 
   // Of the sessions of `tenant` that were created after `after`, in the order of their creation, the first `count` that
   // have all of `labels`. No two sessions were created at the same time.
@@ -107,6 +117,7 @@ class SessionRegistry {
   const Clock clock_;
   SessionLog& log_;
   const std::function<std::string()> make_name_;
+  const FindElsewhere find_elsewhere_;  // may be null
   mutable std::mutex mutex_;
   // Guarded by mutex_.
   std::unordered_map<std::string, std::shared_ptr<Session>> by_name_;

@@ -102,6 +102,7 @@ absl::StatusOr<DataReport> BackUp(const std::string& folder, const std::string& 
   FileSystem& files = *options.files;
   const DataPaths from_paths{folder};
   const DataPaths to_paths{to};
+  WELLSPACE_RETURN_IF_ERROR(DataFolder::CheckNotPaired(from_paths, files));
   SessionTablesOptions read_only = options.tables;
   read_only.is_read_only = true;
   WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<SessionTables> tables,

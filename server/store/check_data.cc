@@ -189,6 +189,7 @@ void Count(const StoredSessions& stored, DataReport& report) {
 absl::StatusOr<DataReport> CheckData(const std::string& folder, const CheckDataOptions& options) {
   const DataPaths paths{folder};
   FileSystem& files = *options.files;
+  WELLSPACE_RETURN_IF_ERROR(DataFolder::CheckNotPaired(paths, files));
   DataReport report;
   WELLSPACE_ASSIGN_OR_RETURN(report.unknown, FindUnknown(paths, files));
   // Before SQLite looks at it, and reads no more of it than it takes for whole.

@@ -126,9 +126,17 @@ std::vector<std::string> FilesOf(const DataPaths& paths, const store::v1::Sessio
 }
 
 absl::StatusOr<std::vector<std::string>> FindUnknown(const DataPaths& paths, FileSystem& files) {
-  static constexpr std::array<std::string_view, 10> kKnown = {
-      "lock",        "back-up.lock",        "ballast",         "files",           "lost",
-      "sessions.db", "sessions.db-journal", "sessions.db-shm", "sessions.db-wal", "sessions.db-mark"};
+  static constexpr std::array<std::string_view, 11> kKnown = {"lock",
+                                                              "back-up.lock",
+                                                              "ballast",
+                                                              "files",
+                                                              "lost",
+                                                              "store",
+                                                              "sessions.db",
+                                                              "sessions.db-journal",
+                                                              "sessions.db-shm",
+                                                              "sessions.db-wal",
+                                                              "sessions.db-mark"};
   std::vector<std::string> unknown;
   WELLSPACE_ASSIGN_OR_RETURN(const std::vector<std::string> names, files.List(paths.root));
   for (const std::string& name : names) {
@@ -170,16 +178,25 @@ absl::StatusOr<std::unique_ptr<DataFolder>> DataFolder::Open(const std::string& 
   }
   folder->folder_lock_ = *std::move(folder_lock);
   folder->lock_ = *std::move(lock);
-  WELLSPACE_RETURN_IF_ERROR(WithAdvice(files.CreateFolder(folder->paths_.files())));
+  WELLSPACE_RETURN_IF_ERROR(MakeFiles(folder->paths_, files));
+  return folder;
+}
+
+absl::StatusOr<std::unique_ptr<DataFolder>> DataFolder::OpenShared(const std::string& root, FileSystem& files) {
+  std::unique_ptr<DataFolder> folder(new DataFolder(DataPaths{root}, files));
+  WELLSPACE_RETURN_IF_ERROR(WithAdvice(files.CreateFolder(root)));
+  WELLSPACE_RETURN_IF_ERROR(MakeFiles(folder->paths_, files));
+  return folder;
+}
+
+absl::Status DataFolder::MakeFiles(const DataPaths& paths, FileSystem& files) {
+  WELLSPACE_RETURN_IF_ERROR(WithAdvice(files.CreateFolder(paths.files())));
   // The name of the folder itself; the names in it are synchronised once the database is there. Folders above it may be
   // closed to this user, who has then not made it either.
-  const std::filesystem::path path(root);
+  const std::filesystem::path path(paths.root);
   const std::string parent = (path.has_filename() ? path : path.parent_path()).parent_path().string();
-  if (const absl::Status named = files.SynchronizeFolder(parent.empty() ? "." : parent);
-      !named.ok() && named.code() != absl::StatusCode::kPermissionDenied) {
-    return named;
-  }
-  return folder;
+  const absl::Status named = files.SynchronizeFolder(parent.empty() ? "." : parent);
+  return named.code() == absl::StatusCode::kPermissionDenied ? absl::OkStatus() : named;
 }
 
 absl::StatusOr<bool> DataFolder::FindDatabase() {

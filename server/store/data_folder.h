@@ -5,6 +5,7 @@
 //   sessions.db       and -wal, -shm beside it: the database (SessionTables)
 //   sessions.db-mark  how much of -wal has to be there (LogMark)
 //   ballast           room that is kept for deletions (Ballast)
+//   store             in the place of all these, where the records are in a database elsewhere: which one (Pairing)
 //   files/            points and meshes of sessions
 //     ID.points-REVISION-EPOCH  points, as they came (PointFile), begun at a revision by the owner at an epoch
 //     ID.mesh-REVISION-EPOCH    the mesh at a revision (MeshFile); with .tmp behind it, one that is being written
@@ -46,6 +47,7 @@ struct DataPaths {
   std::string back_up_lock() const { return root + "/back-up.lock"; }
   std::string database() const { return root + "/sessions.db"; }
   std::string ballast() const { return root + "/ballast"; }
+  std::string pairing() const { return root + "/store"; }
   std::string files() const { return root + "/files"; }
   std::string lost() const { return root + "/lost"; }
   // `session`: its name.
@@ -59,7 +61,14 @@ inline bool IsNameOfOurs(const std::string& name) { return EpochOfName(name).has
 // When a file in lost/ was found, by its name. None: the name is not as we give them.
 std::optional<absl::Time> FoundAt(const std::string& lost_name);
 
-// A folder, which no other process serves meanwhile.
+// A database whose records name the files of a folder.
+struct Pairing {
+  std::string id;        // of the database
+  std::string database;  // its address, for messages
+  std::string folder;    // that the database was first used with, for messages; empty: with none yet
+};
+
+// A folder, which no other process serves meanwhile, but for those that share a database elsewhere.
 //
 // Thread safety: thread-safe.
 class DataFolder {
@@ -70,7 +79,21 @@ class DataFolder {
   //             written to. Others of a FileSystem.
   static absl::StatusOr<std::unique_ptr<DataFolder>> Open(const std::string& root, FileSystem& files);
 
+  // The same of a folder that several processes use at once, since their records are in a database elsewhere. Pair
+  // says which.
+  static absl::StatusOr<std::unique_ptr<DataFolder>> OpenShared(const std::string& root, FileSystem& files);
+
   const DataPaths& paths() const { return paths_; }
+
+  // Holds the folder to the database `with`: writes down in a new one that it belongs to it.
+  //
+  // Errors:     FAILED_PRECONDITION: it belongs to another one, or has one of its own, or `with` has another folder; or
+  //             a server that has the records in the folder has it in use. Others of a FileSystem.
+  absl::Status Pair(const Pairing& with);
+  // Refuses a folder that belongs to a database elsewhere.
+  //
+  // Errors:     FAILED_PRECONDITION, with that database.
+  static absl::Status CheckNotPaired(const DataPaths& paths, FileSystem& files);
 
   // Looks for the database, and makes an empty one in a new folder. True where it may have no tables: it is new, or the
   // server that made it ended before it had made them.
@@ -90,6 +113,9 @@ class DataFolder {
   static constexpr absl::Duration kKeptLost = absl::Hours(24);
 
  private:
+  // Makes the folder of files in the folder that is there.
+  static absl::Status MakeFiles(const DataPaths& paths, FileSystem& files);
+
   using Candidates = std::map<std::string, std::unique_ptr<FilesInUse::Use>>;  // by name
 
   DataFolder(DataPaths paths, FileSystem& files) : paths_(std::move(paths)), files_(files) {}

@@ -37,6 +37,7 @@ uint64_t BallastBytesFor(const std::string& folder) {
 absl::StatusOr<std::unique_ptr<SessionLog>> OpenDurableLog(const DurableLogOptions& options) {
   HideFolder(options.folder);
   WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<DataFolder> folder, DataFolder::Open(options.folder, *options.files));
+  WELLSPACE_RETURN_IF_ERROR(DataFolder::CheckNotPaired(folder->paths(), *options.files));
   SessionTablesOptions tables_options = options.tables;
   tables_options.files = options.files;
   if (options.ballast_bytes > 0) {

@@ -40,7 +40,8 @@ uint64_t BallastBytesFor(const std::string& folder);
 // Opens the folder, or makes it: SqliteRecords, and FolderFiles. Damage to files of sessions is no error here,
 // but of these sessions' reads.
 //
-// Errors:     those of DataFolder::Open, DataFolder::FindDatabase, CheckLog and SessionTables::Open.
+// Errors:     those of DataFolder::Open, DataFolder::CheckNotPaired, DataFolder::FindDatabase, CheckLog and
+//             SessionTables::Open.
 absl::StatusOr<std::unique_ptr<SessionLog>> OpenDurableLog(const DurableLogOptions& options);
 
 }  // namespace wellspace::server

@@ -77,6 +77,14 @@ struct Census {
   uint64_t oldest_epoch = 0;  // of the owners that there are: those at epochs before it are no more
 };
 
+// The owner of a session, where several processes share the records.
+struct SessionOwner {
+  std::string tenant;    // of the session
+  std::string address;   // where the owner serves; empty: it has not told
+  bool is_self = false;  // this process
+  bool lives = false;    // else the session is Take's, or TakeOrphans'
+};
+
 // Where the points of a session are: SessionRecord.points_files, also of a record that is older than these.
 std::vector<store::v1::PointsFile> PointsFilesOf(const store::v1::SessionRecord& record);
 
@@ -141,6 +149,27 @@ class Records {
   //
   // Errors:     ABORTED: this process owns nothing any more.
   virtual absl::StatusOr<Census> ReadCensus() = 0;
+
+  // ---- Where several processes own sessions at once. What stands here is of records that one process has at a time.
+
+  virtual bool is_shared() const { return false; }
+
+  // Tells the others where this process serves.
+  virtual absl::Status Announce(const std::string& /*address*/) { return absl::OkStatus(); }
+
+  // Whether what this process knows of its sessions is still so: no other may have taken them.
+  //
+  // Complexity: O(1), without the database.
+  // Errors:     STORE_FAILED: it is not known now.
+  virtual absl::Status CheckOwnership() const { return absl::OkStatus(); }
+
+  // None: there is no such session.
+  virtual absl::StatusOr<std::optional<SessionOwner>> FindOwner(const std::string& /*session*/) {
+    return std::optional<SessionOwner>();
+  }
+
+  // Takes over all sessions of owners that are no more, at an epoch that is new. To be called again and again.
+  virtual absl::StatusOr<std::vector<StoredSession>> TakeOrphans() { return std::vector<StoredSession>(); }
 };
 
 }  // namespace wellspace::server

@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
+#include "server/store/record_rows.h"
 #include "server/store/session_schema.h"
 #include "server/store/session_statements.h"
 #include "server/wire/errors.h"
@@ -116,16 +117,112 @@ absl::Status SessionTables::SetSurvives(Survives survives) {
   return absl::OkStatus();
 }
 
+// The rows of a transaction.
+class SessionTables::Rows final : public RecordRows {
+ public:
+  explicit Rows(SessionTables& tables) : database_(*tables.database_), statements_(*tables.statements_) {}
+
+  absl::StatusOr<Row> FindSession(const std::string& session) override {
+    SqliteStatement& find = statements_.find_session;
+    find.Bind(std::string_view(session));
+    WELLSPACE_ASSIGN_OR_RETURN(const bool has_epochs, find.Step());
+    Row row;
+    if (has_epochs) {
+      row.epoch = find.Number(0);
+      if (!find.IsNull(1)) {
+        row.id = find.Number(1);
+        row.own_epoch = find.Number(2);
+        row.epoch = std::max(row.epoch, row.own_epoch);
+      }
+    }
+    find.Reset();
+    if (!has_epochs) {
+      return MakeError(v1::ERROR_REASON_INTERNAL, "changes are made by who has taken the sessions over");
+    }
+    return row;
+  }
+
+  absl::StatusOr<int64_t> InsertSession(const std::string& session, int64_t epoch, const std::string& record) override {
+    WELLSPACE_RETURN_IF_ERROR(Run(statements_.insert_session, std::string_view(session), SqliteStatement::Blob{record},
+                                  ChecksumOf(KeyOfSession(session, epoch), record), epoch));
+    return sqlite3_last_insert_rowid(database_.handle());
+  }
+
+  absl::Status UpdateSession(const std::string& session, const Row& row, const std::string& record) override {
+    return Run(statements_.update_session, SqliteStatement::Blob{record},
+               ChecksumOf(KeyOfSession(session, row.own_epoch), record), *row.id);
+  }
+
+  absl::Status DeleteSession(int64_t id) override {
+    for (SqliteStatement* statement : {&statements_.delete_steps, &statements_.delete_operations,
+                                       &statements_.delete_sizes, &statements_.delete_session}) {
+      WELLSPACE_RETURN_IF_ERROR(Run(*statement, id));
+    }
+    return absl::OkStatus();
+  }
+
+  absl::StatusOr<int64_t> NextStep(int64_t session) override {
+    SqliteStatement& next = statements_.next_step;
+    next.Bind(session);
+    WELLSPACE_RETURN_IF_ERROR(next.Step().status());
+    const int64_t number = next.Number(0);
+    next.Reset();
+    return number;
+  }
+
+  absl::Status InsertStep(int64_t session, int64_t number, int64_t kind, const std::string& record) override {
+    return Run(statements_.insert_step, session, number, kind, SqliteStatement::Blob{record},
+               ChecksumOf(KeyOfStep(session, number, kind), record));
+  }
+
+  absl::Status PutOperation(int64_t session, int64_t number, const std::string& record) override {
+    return Run(statements_.put_operation, session, number, SqliteStatement::Blob{record},
+               ChecksumOf(KeyOfOperation(session, number), record));
+  }
+
+  absl::Status DropOperation(int64_t session, int64_t number) override {
+    return Run(statements_.drop_operation, session, number);
+  }
+
+  absl::Status InsertSizes(int64_t session, int64_t number, int64_t part, const std::string& record) override {
+    return Run(statements_.insert_sizes, session, number, part, SqliteStatement::Blob{record},
+               ChecksumOf(KeyOfSizes(session, number, part), record));
+  }
+
+  absl::Status DropSizes(int64_t session, int64_t number) override {
+    return Run(statements_.drop_sizes, session, number);
+  }
+
+  absl::StatusOr<bool> InsertAnswer(const store::v1::AnswerRecord& answer, const std::string& record) override {
+    WELLSPACE_RETURN_IF_ERROR(Run(statements_.put_answer, std::string_view(answer.tenant()),
+                                  std::string_view(answer.request_id()), SqliteStatement::Blob{record},
+                                  static_cast<int64_t>(answer.time_ns()),
+                                  ChecksumOf(KeyOfAnswer(answer.tenant(), answer.request_id()), record)));
+    return sqlite3_changes(database_.handle()) > 0;
+  }
+
+ private:
+  template <typename... Values>
+  static absl::Status Run(SqliteStatement& statement, const Values&... values) {
+    statement.Bind(values...);
+    return statement.Run();
+  }
+
+  SqliteDatabase& database_;
+  Statements& statements_;
+};
+
 absl::Status SessionTables::Apply(std::span<const SessionChange* const> changes, std::span<const AnswerKey> forgotten,
                                   Survives survives) {
   const std::lock_guard lock(mutex_);
+  Rows rows(*this);
   return Transact(survives, [&]() -> absl::Status {
     for (const AnswerKey& key : forgotten) {
       statements_->drop_answer.Bind(std::string_view(key.tenant), std::string_view(key.request_id));
       WELLSPACE_RETURN_IF_ERROR(statements_->drop_answer.Run());
     }
     for (const SessionChange* change : changes) {
-      WELLSPACE_RETURN_IF_ERROR(ApplyOne(*change));
+      WELLSPACE_RETURN_IF_ERROR(WriteChange(rows, *change));
     }
     return absl::OkStatus();
   });
@@ -218,152 +315,6 @@ absl::Status SessionTables::WriteEpochs(const Epochs& epochs) {
   statements_->write_epochs.Bind(epochs.last, epochs.everything,
                                  ChecksumOf(KeyOfEpochs(epochs.last, epochs.everything), ""));
   return statements_->write_epochs.Run();
-}
-
-absl::Status SessionTables::ApplyOne(const SessionChange& change) {
-  WELLSPACE_ASSIGN_OR_RETURN(const Row row, Find(change.session));
-  const auto epoch = static_cast<int64_t>(change.epoch);
-  const bool names_none = !change.state.has_value() && change.steps.empty() && change.operations.empty() &&
-                          change.dropped_operations.empty() && !change.sizes.has_value();
-  if (row.id.has_value() ? row.epoch != epoch
-                         : row.epoch > epoch || !(change.is_creation || change.is_deletion || names_none)) {
-    return OwnedElsewhere(change.session);
-  }
-  if (row.id.has_value() && change.is_creation) {
-    return MakeError(v1::ERROR_REASON_INTERNAL, absl::StrCat(change.session, " is there already"));
-  }
-  if (change.is_deletion) {
-    WELLSPACE_RETURN_IF_ERROR(row.id.has_value() ? Delete(*row.id) : absl::OkStatus());
-  } else if (!names_none || row.id.has_value()) {
-    WELLSPACE_RETURN_IF_ERROR(Write(change, row));
-  }
-  return change.answer.has_value() ? WriteAnswer(*change.answer) : absl::OkStatus();
-}
-
-absl::StatusOr<SessionTables::Row> SessionTables::Find(const std::string& session) {
-  SqliteStatement& find = statements_->find_session;
-  find.Bind(std::string_view(session));
-  WELLSPACE_ASSIGN_OR_RETURN(const bool has_epochs, find.Step());
-  Row row;
-  if (has_epochs) {
-    row.epoch = find.Number(0);
-    if (!find.IsNull(1)) {
-      row.id = find.Number(1);
-      row.own_epoch = find.Number(2);
-      row.epoch = std::max(row.epoch, row.own_epoch);
-    }
-  }
-  find.Reset();
-  if (!has_epochs) {
-    return MakeError(v1::ERROR_REASON_INTERNAL, "changes are made by who has taken the sessions over");
-  }
-  return row;
-}
-
-absl::Status SessionTables::Delete(int64_t id) {
-  for (SqliteStatement* statement : {&statements_->delete_steps, &statements_->delete_operations,
-                                     &statements_->delete_sizes, &statements_->delete_session}) {
-    statement->Bind(id);
-    WELLSPACE_RETURN_IF_ERROR(statement->Run());
-  }
-  return absl::OkStatus();
-}
-
-absl::Status SessionTables::Write(const SessionChange& change, const Row& row) {
-  std::optional<int64_t> id = row.id;
-  if (change.state.has_value()) {
-    const std::string state = change.state->SerializeAsString();
-    if (id.has_value()) {
-      SqliteStatement& update = statements_->update_session;
-      const uint64_t checksum = ChecksumOf(KeyOfSession(change.session, row.own_epoch), state);
-      update.Bind(SqliteStatement::Blob{state}, checksum, *id);
-      WELLSPACE_RETURN_IF_ERROR(update.Run());
-    } else {
-      const auto epoch = static_cast<int64_t>(change.epoch);
-      SqliteStatement& insert = statements_->insert_session;
-      const uint64_t checksum = ChecksumOf(KeyOfSession(change.session, epoch), state);
-      insert.Bind(std::string_view(change.session), SqliteStatement::Blob{state}, checksum, epoch);
-      WELLSPACE_RETURN_IF_ERROR(insert.Run());
-      id = sqlite3_last_insert_rowid(database_->handle());
-    }
-  }
-  if (!id.has_value()) {
-    return MakeError(v1::ERROR_REASON_INTERNAL,
-                     absl::StrCat("session ", change.session, " is created without a record"));
-  }
-  WELLSPACE_RETURN_IF_ERROR(WriteSteps(*id, change.steps));
-  WELLSPACE_RETURN_IF_ERROR(WriteOperations(*id, change));
-  return WriteSizes(*id, change);
-}
-
-absl::Status SessionTables::WriteSteps(int64_t session, const std::vector<store::v1::StepRecord>& steps) {
-  if (steps.empty()) {
-    return absl::OkStatus();
-  }
-  statements_->next_step.Bind(session);
-  WELLSPACE_RETURN_IF_ERROR(statements_->next_step.Step().status());
-  int64_t number = statements_->next_step.Number(0);
-  statements_->next_step.Reset();
-  for (const store::v1::StepRecord& step : steps) {
-    const std::string record = step.SerializeAsString();
-    const int64_t kind = step.step_case();
-    statements_->insert_step.Bind(session, number, kind, SqliteStatement::Blob{record},
-                                  ChecksumOf(KeyOfStep(session, number, kind), record));
-    WELLSPACE_RETURN_IF_ERROR(statements_->insert_step.Run());
-    ++number;
-  }
-  return absl::OkStatus();
-}
-
-absl::Status SessionTables::WriteOperations(int64_t session, const SessionChange& change) {
-  for (const store::v1::OperationRecord& operation : change.operations) {
-    const std::string record = operation.SerializeAsString();
-    const auto number = static_cast<int64_t>(operation.number());
-    statements_->put_operation.Bind(session, number, SqliteStatement::Blob{record},
-                                    ChecksumOf(KeyOfOperation(session, number), record));
-    WELLSPACE_RETURN_IF_ERROR(statements_->put_operation.Run());
-  }
-  for (const uint64_t number : change.dropped_operations) {
-    statements_->drop_operation.Bind(session, number);
-    WELLSPACE_RETURN_IF_ERROR(statements_->drop_operation.Run());
-  }
-  return absl::OkStatus();
-}
-
-absl::Status SessionTables::WriteSizes(int64_t session, const SessionChange& change) {
-  for (const uint64_t number : change.dropped_sizes) {
-    statements_->drop_sizes.Bind(session, number);
-    WELLSPACE_RETURN_IF_ERROR(statements_->drop_sizes.Run());
-  }
-  if (!change.sizes.has_value()) {
-    return absl::OkStatus();
-  }
-  const auto number = static_cast<int64_t>(change.sizes->number);
-  int64_t part = 0;
-  const auto write = [&](const store::v1::SizesRecord& sizes) {
-    const std::string record = sizes.SerializeAsString();
-    statements_->insert_sizes.Bind(session, number, part, SqliteStatement::Blob{record},
-                                   ChecksumOf(KeyOfSizes(session, number, part), record));
-    ++part;
-    return statements_->insert_sizes.Run();
-  };
-  for (const store::v1::SizesRecord& sizes : change.sizes->parts) {
-    WELLSPACE_RETURN_IF_ERROR(write(sizes));
-  }
-  const StoredSizes::InTurn& in_turn = change.sizes->in_turn;
-  for (size_t i = 0; i < in_turn.count; ++i) {
-    WELLSPACE_RETURN_IF_ERROR(write(in_turn.make(i)));
-  }
-  return absl::OkStatus();
-}
-
-absl::Status SessionTables::WriteAnswer(const store::v1::AnswerRecord& answer) {
-  const std::string record = answer.SerializeAsString();
-  statements_->put_answer.Bind(std::string_view(answer.tenant()), std::string_view(answer.request_id()),
-                               SqliteStatement::Blob{record}, static_cast<int64_t>(answer.time_ns()),
-                               ChecksumOf(KeyOfAnswer(answer.tenant(), answer.request_id()), record));
-  WELLSPACE_RETURN_IF_ERROR(statements_->put_answer.Run());
-  return sqlite3_changes(database_->handle()) > 0 ? absl::OkStatus() : AnsweredBefore(answer.request_id());
 }
 
 }  // namespace wellspace::server

@@ -99,15 +99,10 @@ class SessionTables {
 
  private:
   struct Statements;
+  class Rows;
   struct Epochs {
     int64_t last = 0;        // that any owner has got
     int64_t everything = 0;  // that of the last owner that has taken all
-  };
-  // The place of a session in the tables.
-  struct Row {
-    std::optional<int64_t> id{};  // none: it is not there
-    int64_t own_epoch = 0;        // of the row
-    int64_t epoch = 0;            // at which the session is; of one that is not there, that of everything
   };
 
   SessionTables(std::unique_ptr<SqliteDatabase> database, int checkpoint_pages);
@@ -125,14 +120,6 @@ class SessionTables {
   absl::Status Transact(Survives survives, const std::function<absl::Status()>& write);
   absl::StatusOr<Epochs> ReadEpochs();
   absl::Status WriteEpochs(const Epochs& epochs);
-  absl::Status ApplyOne(const SessionChange& change);
-  absl::Status Delete(int64_t id);
-  absl::Status Write(const SessionChange& change, const Row& row);
-  absl::Status WriteSteps(int64_t session, const std::vector<store::v1::StepRecord>& steps);
-  absl::Status WriteOperations(int64_t session, const SessionChange& change);
-  absl::Status WriteSizes(int64_t session, const SessionChange& change);
-  absl::Status WriteAnswer(const store::v1::AnswerRecord& answer);
-  absl::StatusOr<Row> Find(const std::string& session);
   absl::StatusOr<std::optional<int64_t>> FindId(const std::string& session);
   // The record and the epoch of its row; `*id` is the row's.
   absl::StatusOr<std::optional<StoredSession>> ReadOne(const std::string& session, int64_t* id);

@@ -3,17 +3,15 @@
 #define WELLSPACE_SERVER_STORE_SQLITE_RECORDS_H_
 
 #include <atomic>
-#include <condition_variable>
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "server/store/ballast.h"
+#include "server/store/change_queue.h"
 #include "server/store/data_folder.h"
 #include "server/store/records.h"
 #include "server/store/session_tables.h"
@@ -41,11 +39,11 @@ class SqliteRecords final : public Records {
   uint64_t epoch() const override { return epoch_; }
   absl::StatusOr<StoredSessions> Load() override;
   absl::StatusOr<std::optional<StoredSession>> Take(const std::string& session) override;
-  absl::Status Apply(const SessionChange& change, Survives survives) override;
+  absl::Status Apply(const SessionChange& change, Survives survives) override { return queue_.Apply(change, survives); }
   absl::StatusOr<std::optional<store::v1::AnswerRecord>> FindAnswer(const AnswerKey& request) override {
     return tables_->FindAnswer(request);
   }
-  void Forget(std::span<const AnswerKey> answers) override;
+  void Forget(std::span<const AnswerKey> answers) override { queue_.Forget(answers); }
   absl::StatusOr<std::vector<store::v1::StepRecord::Features>> ReadFeatures(const std::string& session) override {
     return tables_->ReadFeatures(session);
   }
@@ -58,16 +56,6 @@ class SqliteRecords final : public Records {
   absl::StatusOr<Census> ReadCensus() override;
 
  private:
-  // A change, and the thread that waits for it.
-  struct Waiting {
-    const SessionChange* change = nullptr;
-    Survives survives = Survives::kPowerLoss;
-    uint64_t bytes = 0;
-    bool is_done = false;
-    absl::Status status{};
-    std::condition_variable changed{};
-  };
-
   SqliteRecords(std::shared_ptr<DataFolder> folder, std::unique_ptr<SessionTables> tables,
                 std::shared_ptr<StoreHealth> health, std::shared_ptr<Ballast> ballast, uint64_t epoch);
 
@@ -75,11 +63,10 @@ class SqliteRecords final : public Records {
   //
   // Errors:     those of SessionTables::TakeAll.
   absl::Status TakeAll();
+  absl::Status ApplyTogether(std::span<const SessionChange* const> changes, std::span<const AnswerKey> forgotten,
+                             Survives survives);
   // Has committed changes take up less room, once that is worth it.
   void Checkpoint();
-  std::vector<Waiting*> TakeBatch();
-  void ApplyBatch(std::span<Waiting* const> batch, std::vector<AnswerKey> forgotten);
-  absl::Status ApplyTogether(std::span<Waiting* const> batch, std::span<const AnswerKey> forgotten);
   // Errors:     those of StoreHealth::CheckRoom, once the database has given back unused room.
   absl::Status CheckRoom();
   // Calls `apply`, and again once there may be room for its writes.
@@ -91,11 +78,7 @@ class SqliteRecords final : public Records {
   const std::shared_ptr<Ballast> ballast_;
   const uint64_t epoch_;
   std::atomic<bool> has_taken_ = false;
-
-  std::mutex mutex_;
-  // Guarded by mutex_.
-  std::deque<Waiting*> queue_;  // the thread of the first commits for those behind it, too
-  std::vector<AnswerKey> forgotten_;
+  ChangeQueue queue_;
 };
 
 }  // namespace wellspace::server

@@ -22,10 +22,12 @@ constexpr int kRetrySeconds = 1;
 // KiB.
 constexpr size_t kMaxErrorMessageBytes = 1024;
 
-// Payloads of a status: the name of its ErrorReason, the path of the field to blame, and that the call may be repeated.
+// Payloads of a status: the name of its ErrorReason, the path of the field to blame, that the call may be repeated, and
+// the address of the server that has the session.
 constexpr char kReason[] = "wellspace.v1/reason";
 constexpr char kField[] = "wellspace.v1/field";
 constexpr char kMayRetry[] = "wellspace.v1/may_retry";
+constexpr char kAddress[] = "wellspace.v1/address";
 
 absl::string_view ToAbsl(std::string_view text) { return {text.data(), text.size()}; }
 
@@ -165,6 +167,9 @@ google::rpc::Status DetailsOf(const absl::Status& status, const std::string& rea
   google::rpc::ErrorInfo info;
   info.set_reason(reason);
   info.set_domain(kErrorDomain);
+  if (const absl::optional<absl::Cord> address = status.GetPayload(kAddress); address.has_value()) {
+    (*info.mutable_metadata())["address"] = std::string(*address);
+  }
   details.add_details()->PackFrom(info);
   if (const absl::optional<absl::Cord> field = status.GetPayload(kField); field.has_value()) {
     google::rpc::BadRequest bad_request;
@@ -205,6 +210,14 @@ absl::Status MemoryLimitError(std::string_view message, bool may_retry) {
 
 bool IsMemoryLimit(const absl::Status& status) {
   return status.GetPayload(kReason) == absl::Cord(v1::ErrorReason_Name(v1::ERROR_REASON_MEMORY_LIMIT));
+}
+
+absl::Status SessionElsewhereError(std::string_view message, std::string_view address) {
+  absl::Status status = MakeError(v1::ERROR_REASON_SESSION_ELSEWHERE, message);
+  if (!address.empty()) {
+    status.SetPayload(kAddress, absl::Cord(ToAbsl(address)));
+  }
+  return status;
 }
 
 grpc::Status ToGrpcStatus(const absl::Status& status) {

@@ -29,6 +29,8 @@ absl::Status OfSurface(const absl::Status& status);
 // A MEMORY_LIMIT, which passes with time or does not.
 absl::Status MemoryLimitError(std::string_view message, bool may_retry);
 bool IsMemoryLimit(const absl::Status& status);
+// A SESSION_ELSEWHERE. `address`: where the server is that has the session; empty: unknown.
+absl::Status SessionElsewhereError(std::string_view message, std::string_view address);
 
 // The status of a call that ended with `status`: with ErrorInfo, BadRequest where there is a field, and RetryInfo where
 // the call may be repeated. To be called where a status leaves the server, nowhere else.

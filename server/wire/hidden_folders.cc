@@ -65,7 +65,7 @@ void HideFolder(const std::string& folder) {
 }
 
 std::string WithoutFolders(std::string_view message) {
-  std::string text(message);
+  std::string text(message.substr(0, message.find(kDatabaseSays)));
   HiddenFolders& hidden = Hidden();
   const std::lock_guard lock(hidden.mutex);
   for (const std::string& folder : hidden.folders) {

@@ -136,6 +136,23 @@ TEST(OptionSources, APasswordInAnAddressIsNotPrinted) {
   const Result result = RunServer({"--check-config"}, "WELLSPACED_DATA=postgresql://user:se/cret@host/db");
   EXPECT_THAT(result.out, AllOf(HasSubstr("data = \"postgresql://user:***@host/db\""), Not(HasSubstr("cret"))));
   EXPECT_THAT(RunServer({"--check-config", "--data", "s3://bucket/a:b@c"}).out, HasSubstr("\"s3://bucket/a:b@c\""));
+  const Result behind = RunServer({"--check-config", "--data", "folder"},
+                                  "WELLSPACED_STORE='postgresql://host/db?password=secret&sslpassword=cret&user=me'");
+  EXPECT_THAT(behind.out, AllOf(HasSubstr("db?password=***&sslpassword=***&user=me"), Not(HasSubstr("cret"))));
+  EXPECT_EQ(behind.code, 0);
+}
+
+// An address that is none is not repeated, since its password may be where none belongs.
+TEST(OptionSources, AStoreWantsAnAddressAndAFolder) {
+  const Result wrong = RunServer({"--data", "folder", "--store", "postgresql://user:se%cret@host/db"});
+  EXPECT_EQ(wrong.code, 2);
+  EXPECT_THAT(wrong.err,
+              AllOf(HasSubstr("--store"), HasSubstr("postgresql://USER:PASSWORD@HOST"), Not(HasSubstr("cret"))));
+  EXPECT_EQ(RunServer({"--data", "folder", "--store", "mysql://host/db"}).code, 2);
+  const Result alone = RunServer({"--store", "postgresql://host/db"});
+  EXPECT_EQ(alone.code, 2);
+  EXPECT_THAT(alone.err, HasSubstr("--store wants --data"));
+  EXPECT_EQ(RunServer({"--store", "postgresql://host/db", "--check-config"}).code, 1);
 }
 
 }  // namespace

@@ -122,6 +122,8 @@ ErrorDetails DetailsOf(const grpc::Status& status) {
       const std::string prefix = "ERROR_REASON_";
       EXPECT_EQ(info.reason().substr(0, prefix.size()), prefix);
       details.reason = info.reason().substr(prefix.size());
+      const auto address = info.metadata().find("address");
+      details.address = address == info.metadata().end() ? "" : address->second;
     } else if (google::rpc::BadRequest bad_request; any.UnpackTo(&bad_request)) {
       details.field = bad_request.field_violations(0).field();
     } else if (google::rpc::RetryInfo retry; any.UnpackTo(&retry)) {

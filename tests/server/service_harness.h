@@ -50,6 +50,7 @@ struct ErrorDetails {
   std::string reason;  // without the prefix ERROR_REASON_
   std::string field;
   bool may_retry = false;
+  std::string address;  // of the server that has the session
 };
 ErrorDetails DetailsOf(const grpc::Status& status);
 // Of the server as clients see it.

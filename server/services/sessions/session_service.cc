@@ -55,6 +55,7 @@ std::string ListOf(const Caller& caller, const Labels& labels) {
 
 absl::Status List(const CallEnvironment& environment, const Caller& caller, const v1::ListSessionsRequest& request,
                   v1::ListSessionsResponse& response) {
+  WELLSPACE_RETURN_IF_ERROR(environment.session_log.records().CheckOwnership());
   WELLSPACE_ASSIGN_OR_RETURN(const size_t count, PageSizeOf(request));
   WELLSPACE_ASSIGN_OR_RETURN(const Labels labels, LabelsFromProto(request.labels(), "labels"));
   const std::string list = ListOf(caller, labels);

@@ -14,7 +14,9 @@
 #include "gtest/gtest.h"
 #include "server/store/ballast.h"
 #include "server/store/memory_records.h"
+#include "server/store/postgres_records.h"
 #include "server/store/sqlite_records.h"
+#include "tests/server/store/postgres_server.h"
 #include "tests/server/store/store_support.h"
 
 namespace wellspace::server {
@@ -51,9 +53,26 @@ class SharedDatabase final : public SharedRecords {
   const TestFolder folder_;
 };
 
+// Each process has a name of its own, and a lease that lasts.
+class SharedPostgres final : public SharedRecords {
+ public:
+  std::shared_ptr<Records> Begin() override {
+    absl::StatusOr<std::unique_ptr<PostgresRecords>> records =
+        PostgresRecords::Open({.address = address_, .owner = absl::StrCat("process ", ++processes_)},
+                              /*folder=*/nullptr, std::make_shared<StoreHealth>(nullptr));
+    EXPECT_TRUE(records.ok()) << records.status();
+    return *std::move(records);
+  }
+
+ private:
+  const std::string address_ = PostgresServer::OfThisProgram().NewDatabase();
+  int processes_ = 0;
+};
+
 struct Implementation {
   const char* name;
   std::function<std::unique_ptr<SharedRecords>()> make;
+  std::function<std::string()> why_not = [] { return std::string(); };  // it cannot be tested here
 };
 
 class RecordsTest : public ::testing::TestWithParam<Implementation> {
@@ -87,8 +106,16 @@ class RecordsTest : public ::testing::TestWithParam<Implementation> {
     return absl::StrCat(text, sizes->size());
   }
 
-  const std::unique_ptr<SharedRecords> shared_ = GetParam().make();
-  const std::shared_ptr<Records> first_ = shared_->Begin();
+  void SetUp() override {
+    if (const std::string why = GetParam().why_not(); !why.empty()) {
+      GTEST_SKIP() << why;
+    }
+    shared_ = GetParam().make();
+    first_ = shared_->Begin();
+  }
+
+  std::unique_ptr<SharedRecords> shared_;
+  std::shared_ptr<Records> first_;
 };
 
 TEST_P(RecordsTest, AChangeIsItsOwnersAlone) {
@@ -233,9 +260,11 @@ TEST_P(DurableRecordsTest, WhoTakesASessionGetsAllOfIt) {
 
 const Implementation kMemory = {"Memory", [] { return std::make_unique<SharedMemory>(); }};
 const Implementation kSqlite = {"Sqlite", [] { return std::make_unique<SharedDatabase>(); }};
+const Implementation kPostgres = {"Postgres", [] { return std::make_unique<SharedPostgres>(); },
+                                  &PostgresServer::WhyNot};
 const auto kNameOf = [](const auto& of) { return of.param.name; };
-INSTANTIATE_TEST_SUITE_P(All, RecordsTest, ::testing::Values(kMemory, kSqlite), kNameOf);
-INSTANTIATE_TEST_SUITE_P(All, DurableRecordsTest, ::testing::Values(kSqlite), kNameOf);
+INSTANTIATE_TEST_SUITE_P(All, RecordsTest, ::testing::Values(kMemory, kSqlite, kPostgres), kNameOf);
+INSTANTIATE_TEST_SUITE_P(All, DurableRecordsTest, ::testing::Values(kSqlite, kPostgres), kNameOf);
 
 // A process that opens the database owns everything in it.
 TEST(SqliteRecords, TheLastToBeginOwnsAll) {

@@ -65,6 +65,12 @@ TEST(ToGrpcStatus, SendsReasonFieldAndRetry) {
             "details { [type.googleapis.com/google.rpc.RetryInfo] { retry_delay { seconds: 1 } } } ");
 }
 
+TEST(ToGrpcStatus, SaysWhereASessionIs) {
+  EXPECT_EQ(DetailsOf(SessionElsewhereError("x", "host:1")).address, "host:1");
+  EXPECT_EQ(DetailsOf(SessionElsewhereError("x", "")).address, "");
+  EXPECT_TRUE(DetailsOf(SessionElsewhereError("x", "host:1")).may_retry);
+}
+
 TEST(ToGrpcStatus, RepeatsMemoryLimitsOnlyWhereItHelps) {
   EXPECT_EQ(DetailsOf(MemoryLimitError("x", true)).reason, "MEMORY_LIMIT");
   EXPECT_TRUE(DetailsOf(MemoryLimitError("x", true)).may_retry);

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 
+#include "absl/strings/str_cat.h"
 #include "gtest/gtest.h"
 #include "server/wire/errors.h"
 
@@ -28,6 +29,15 @@ TEST(HiddenFolders, ARelativeFolderIsHiddenWhereItIsAbsolute) {
   const std::string absolute = std::filesystem::current_path().string() + "/hidden_relative";
   EXPECT_EQ(WithoutFolders(absolute + "/x"), "x");
   EXPECT_EQ(WithoutFolders("./hidden_relative/x"), "./hidden_relative/x") << "as the server was told, and no more";
+}
+
+TEST(HiddenFolders, WhatADatabaseSaysIsLeftOut) {
+  const std::string message =
+      absl::StrCat("no connection", std::string(kDatabaseSays), "connection to server at \"db.internal\" failed");
+  EXPECT_EQ(WithoutFolders(message), "no connection");
+  const grpc::Status seen = ToGrpcStatus(MakeError(v1::ERROR_REASON_STORE_FAILED, message));
+  EXPECT_EQ(seen.error_message(), "no connection");
+  EXPECT_EQ(seen.error_details().find("internal"), std::string::npos);
 }
 
 TEST(HiddenFolders, NoStatusOfACallHasThem) {

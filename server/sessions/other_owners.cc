@@ -1,0 +1,128 @@
+#include "server/sessions/other_owners.h"
+
+#include <chrono>
+#include <future>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
+#include "server/base/clock.h"
+#include "server/sessions/occupancy.h"
+#include "server/wire/errors.h"
+
+namespace wellspace::server {
+namespace {
+
+// One piece of work of the thread.
+class Turn {
+ public:
+  explicit Turn(std::atomic<int64_t>& begun_at) : begun_at_(begun_at) {
+    begun_at_ = absl::ToInt64Nanoseconds(SinceBoot());
+  }
+  ~Turn() { begun_at_ = 0; }
+  Turn(const Turn&) = delete;
+  Turn& operator=(const Turn&) = delete;
+
+ private:
+  std::atomic<int64_t>& begun_at_;
+};
+
+absl::Status Unknown(const std::string& name) {
+  return MakeError(v1::ERROR_REASON_STORE_FAILED,
+                   absl::StrCat("it takes long to find out which server has ", name, "; try again"));
+}
+
+}  // namespace
+
+void OtherOwners::Start() {
+  if (records_.is_shared()) {
+    thread_.emplace();
+    thread_->PostAfter(kBetweenLooks, [this] { LookAgain(); });
+  }
+}
+
+bool OtherOwners::IsLate() const {
+  const int64_t begun_at = begun_at_;
+  return begun_at != 0 && SinceBoot() - absl::Nanoseconds(begun_at) > kMostWait;
+}
+
+absl::Status OtherOwners::Find(const std::string& tenant, const std::string& name) {
+  if (!thread_.has_value()) {
+    return NoSuchSession(name);
+  }
+  if (IsLate()) {
+    return Unknown(name);
+  }
+  const auto found = std::make_shared<std::promise<absl::Status>>();
+  std::future<absl::Status> answer = found->get_future();
+  thread_->Post([this, tenant, name, found] { found->set_value(RunGuarded([&] { return LookFor(tenant, name); })); });
+  return answer.wait_for(absl::ToChronoMilliseconds(kMostWait)) == std::future_status::ready ? answer.get()
+                                                                                             : Unknown(name);
+}
+
+void OtherOwners::LookAgain() {
+  const auto look = [this] {
+    const Turn turn(begun_at_);
+    for (const std::string& name : std::exchange(left_, {})) {
+      const absl::StatusOr<std::optional<SessionOwner>> owner = records_.FindOwner(name);
+      if (!owner.ok() || (owner->has_value() && (*owner)->is_self && !TakeOne(name).ok())) {
+        left_.push_back(name);
+      }
+    }
+    return TakeOrphans();
+  };
+  RunGuarded(look).IgnoreError();  // the next look is soon
+  thread_->PostAfter(kBetweenLooks, [this] { LookAgain(); });
+}
+
+absl::Status OtherOwners::LookFor(const std::string& tenant, const std::string& name) {
+  const Turn turn(begun_at_);
+  WELLSPACE_ASSIGN_OR_RETURN(const std::optional<SessionOwner> owner, records_.FindOwner(name));
+  if (!owner.has_value() || owner->tenant != tenant) {
+    return NoSuchSession(name);
+  }
+  if (owner->is_self) {
+    return TakeOne(name);
+  }
+  if (owner->lives) {
+    return Elsewhere(name, owner->address);
+  }
+  WELLSPACE_RETURN_IF_ERROR(TakeOrphans());
+  // It is here by now, or another was first.
+  WELLSPACE_ASSIGN_OR_RETURN(const std::optional<SessionOwner> next, records_.FindOwner(name));
+  if (!next.has_value()) {
+    return NoSuchSession(name);
+  }
+  if (next->is_self) {
+    return absl::OkStatus();
+  }
+  return next->lives ? Elsewhere(name, next->address) : Unknown(name);
+}
+
+absl::Status OtherOwners::TakeOrphans() {
+  WELLSPACE_ASSIGN_OR_RETURN(std::vector<StoredSession> taken, records_.TakeOrphans());
+  if (!taken.empty()) {
+    for (std::string& name : take_in_(std::move(taken))) {
+      left_.push_back(std::move(name));
+    }
+  }
+  return absl::OkStatus();
+}
+
+// At a new epoch: what was under way when it left the registry is not to come in between.
+absl::Status OtherOwners::TakeOne(const std::string& name) {
+  if (is_here_(name)) {
+    return absl::OkStatus();  // it was taken in before this turn
+  }
+  WELLSPACE_ASSIGN_OR_RETURN(std::optional<StoredSession> taken, records_.Take(name));
+  if (!taken.has_value()) {
+    return NoSuchSession(name);
+  }
+  std::vector<StoredSession> one;
+  one.push_back(*std::move(taken));
+  return take_in_(std::move(one)).empty() ? absl::OkStatus() : Unknown(name);
+}
+
+}  // namespace wellspace::server

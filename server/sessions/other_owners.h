@@ -1,0 +1,75 @@
+// Sessions of other processes that share the records.
+#ifndef WELLSPACE_SERVER_SESSIONS_OTHER_OWNERS_H_
+#define WELLSPACE_SERVER_SESSIONS_OTHER_OWNERS_H_
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/time/time.h"
+#include "server/jobs/background.h"
+#include "server/store/records.h"
+
+namespace wellspace::server {
+
+// Knows where sessions are that this process does not have, and takes those over whose owner is no more. The database
+// is asked on a thread of its own: calls wait for that no longer than kMostWait, and not at all while it does not
+// answer.
+//
+// Thread safety: thread-safe.
+class OtherOwners {
+ public:
+  static constexpr absl::Duration kMostWait = absl::Seconds(1);
+  // Between looks for owners that are no more.
+  static constexpr absl::Duration kBetweenLooks = absl::Seconds(1);
+
+  // Takes sessions in that are this process's from now on. Returns the names of those of which it is to be tried again.
+  using TakeIn = std::function<std::vector<std::string>(std::vector<StoredSession> sessions)>;
+
+  // Whether a session is here, so that it need not be taken in.
+  using IsHere = std::function<bool(const std::string& name)>;
+
+  // REQUIRES:   `records` outlive this. Where they are not shared, nothing of this does anything.
+  OtherOwners(Records& records, TakeIn take_in, IsHere is_here)
+      : records_(records), take_in_(std::move(take_in)), is_here_(std::move(is_here)) {}
+
+  // Begins to look for owners that are no more. To be called once, before Find.
+  void Start();
+  // Nothing is taken in any more when this returns.
+  void Stop() {
+    if (thread_.has_value()) {
+      thread_->Stop();
+    }
+  }
+
+  // As SessionRegistry::FindElsewhere. A session that is this process's, and not in its registry, is taken in again.
+  //
+  // Errors:     SESSION_NOT_FOUND, SESSION_ELSEWHERE; STORE_FAILED: it is not known now.
+  absl::Status Find(const std::string& tenant, const std::string& name);
+
+ private:
+  // The following are of thread_.
+  void LookAgain();
+  absl::Status LookFor(const std::string& tenant, const std::string& name);
+  absl::Status TakeOrphans();
+  // A session that is this process's, and not here.
+  absl::Status TakeOne(const std::string& name);
+  // Whether what thread_ does takes longer than calls may wait.
+  bool IsLate() const;
+
+  Records& records_;
+  const TakeIn take_in_;
+  const IsHere is_here_;
+  std::vector<std::string> left_;      // of thread_: names to be tried again
+  std::atomic<int64_t> begun_at_ = 0;  // when thread_ has begun what it does, in nanoseconds since boot; 0: nothing
+  std::optional<Background> thread_;   // last: its tasks use what stands above; none where nothing is shared
+};
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_SESSIONS_OTHER_OWNERS_H_

@@ -1,0 +1,433 @@
+#include "server/store/postgres_records.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <optional>
+#include <unordered_map>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
+#include "core/base/status_macros.h"
+#include "server/store/postgres_schema.h"
+#include "server/store/record_keys.h"
+#include "server/store/record_rows.h"
+#include "server/wire/errors.h"
+
+namespace wellspace::server {
+namespace {
+
+// Of an owner that is no more, answers are kept for so long: longer than RequestIds does.
+constexpr absl::Duration kKeptAnswers = absl::Hours(1);
+
+pqxx::binarystring Blob(std::string_view bytes) { return {bytes.data(), bytes.size()}; }
+
+int64_t Checksum(const std::string& key, std::string_view record) {
+  return static_cast<int64_t>(ChecksumOf(key, record));
+}
+
+// The key of the record of a session, the same for every owner.
+std::string KeyOf(std::string_view session) { return KeyOfSession(session, /*epoch=*/0); }
+
+absl::Status Damaged(const std::string& what) {
+  return MakeError(v1::ERROR_REASON_FILE_DAMAGED, absl::StrCat("the database: ", what, " is damaged"));
+}
+
+// The record in these fields of a row; `what` says which it is.
+template <typename Record>
+absl::StatusOr<Record> Parse(const std::string& key, const pqxx::row& row, int record, const std::string& what) {
+  Record parsed;
+  const pqxx::binarystring bytes(row[record]);
+  if (!ParseRecord(key, {bytes.get(), bytes.size()}, row[record + 1].as<int64_t>(), parsed)) {
+    return Damaged(what);
+  }
+  return parsed;
+}
+
+absl::StatusOr<store::v1::StepRecord> ParseStep(const pqxx::row& row) {
+  const auto session = row[0].as<int64_t>();
+  const auto number = row[1].as<int64_t>();
+  return Parse<store::v1::StepRecord>(KeyOfStep(session, number, row[2].as<int64_t>()), row, 3,
+                                      absl::StrCat("step ", number, " of session ", session));
+}
+
+// A row of id, name, epoch, state and crc32c.
+absl::StatusOr<StoredSession> ParseSession(const pqxx::row& row) {
+  const auto name = row[1].as<std::string>();
+  StoredSession session{.epoch = row[2].as<uint64_t>(), .state = {}, .steps = {}, .operations = {}};
+  WELLSPACE_ASSIGN_OR_RETURN(
+      session.state,
+      Parse<store::v1::SessionRecord>(KeyOf(name), row, 3, absl::StrCat("the record of session '", name, "'")));
+  return session;
+}
+
+absl::StatusOr<store::v1::AnswerRecord> ParseAnswer(const pqxx::row& row) {
+  const pqxx::binarystring tenant(row[0]);
+  const pqxx::binarystring request(row[1]);
+  return Parse<store::v1::AnswerRecord>(KeyOfAnswer(tenant.str(), request.str()), row, 2,
+                                        absl::StrCat("the answer to request '", request.str(), "'"));
+}
+
+// Steps, but those of features, and operations of these sessions, whose rows are `ids`. `where` says which rows.
+absl::Status LoadSteps(pqxx::dbtransaction& transaction, const std::string& where, std::span<StoredSession> sessions,
+                       std::span<const int64_t> ids) {
+  std::unordered_map<int64_t, StoredSession*> by_id;
+  for (size_t i = 0; i < ids.size(); ++i) {
+    by_id[ids[i]] = &sessions[i];
+  }
+  for (const pqxx::row& row : transaction.exec(
+           absl::StrCat("SELECT session, number, kind, record, crc32c FROM wellspace.steps WHERE session IN (", where,
+                        ") ORDER BY session, number"))) {
+    WELLSPACE_ASSIGN_OR_RETURN(store::v1::StepRecord step, ParseStep(row));
+    if (step.step_case() != kFeaturesStep) {
+      by_id.at(row[0].as<int64_t>())->steps.push_back(std::move(step));
+    }
+  }
+  for (const pqxx::row& row : transaction.exec(
+           absl::StrCat("SELECT session, number, record, crc32c FROM wellspace.operations WHERE session IN (", where,
+                        ") ORDER BY session, number"))) {
+    const auto session = row[0].as<int64_t>();
+    const auto number = row[1].as<int64_t>();
+    WELLSPACE_ASSIGN_OR_RETURN(
+        by_id.at(session)->operations.emplace_back(),
+        Parse<store::v1::OperationRecord>(KeyOfOperation(session, number), row, 2,
+                                          absl::StrCat("operation ", number, " of session ", session)));
+  }
+  return absl::OkStatus();
+}
+
+// The sessions of which `condition` says which they are, in the order of their creation.
+absl::StatusOr<std::vector<StoredSession>> LoadSessions(pqxx::dbtransaction& transaction,
+                                                        const std::string& condition) {
+  std::vector<StoredSession> sessions;
+  std::vector<int64_t> ids;
+  const std::string which = absl::StrCat(" FROM wellspace.sessions WHERE ", condition);
+  for (const pqxx::row& row :
+       transaction.exec(absl::StrCat("SELECT id, name, epoch, state, crc32c", which, " ORDER BY id"))) {
+    WELLSPACE_ASSIGN_OR_RETURN(sessions.emplace_back(), ParseSession(row));
+    ids.push_back(row[0].as<int64_t>());
+  }
+  WELLSPACE_RETURN_IF_ERROR(LoadSteps(transaction, absl::StrCat("SELECT id", which), sessions, ids));
+  std::ranges::stable_sort(sessions, {}, [](const StoredSession& s) { return s.state.create_time_ns(); });
+  return sessions;
+}
+
+// Owners that are no more. While the database was away leases ran out of owners that live: `is_steady` ($2) says that
+// there has been time to renew them. Those that were given back are out in any case.
+constexpr char kDeadOwners[] =
+    " FROM wellspace.owners WHERE id <> $1 AND lease_until <="
+    " CASE WHEN $2 THEN clock_timestamp() ELSE '-infinity' END";
+
+bool HasDeadOwners(pqxx::dbtransaction& transaction, int64_t owner, bool is_steady) {
+  return transaction.exec_params1(absl::StrCat("SELECT EXISTS(SELECT", kDeadOwners, ")"), owner, is_steady)[0]
+      .as<bool>();
+}
+
+// Gives the sessions of owners that are no more to `owner`, at `epoch`.
+void TakeFromTheDead(pqxx::dbtransaction& transaction, int64_t owner, uint64_t epoch, bool is_steady) {
+  // An owner that comes to renew its lease meanwhile waits, and finds that its row is gone; so does a session that it
+  // makes.
+  for (const pqxx::row& row :
+       transaction.exec_params(absl::StrCat("SELECT id", kDeadOwners, " ORDER BY id FOR UPDATE"), owner, is_steady)) {
+    const auto id = row[0].as<int64_t>();
+    transaction.exec_params0("UPDATE wellspace.sessions SET owner = $1, epoch = $2 WHERE owner = $3", owner, epoch, id);
+    transaction.exec_params0("DELETE FROM wellspace.owners WHERE id = $1", id);
+  }
+}
+
+// Holds database and folder to one another.
+absl::Status Pair(PostgresLink& link, const std::string& shown, DataFolder& folder) {
+  return link.Transact([&](pqxx::dbtransaction& transaction) -> absl::Status {
+    const pqxx::row store = transaction.exec1("SELECT id, folder FROM wellspace.store FOR UPDATE");
+    WELLSPACE_RETURN_IF_ERROR(folder.Pair({.id = store[0].as<std::string>(),
+                                           .database = shown,
+                                           .folder = store[1].is_null() ? "" : store[1].as<std::string>()}));
+    if (store[1].is_null()) {
+      transaction.exec_params0("UPDATE wellspace.store SET folder = $1",
+                               std::filesystem::absolute(folder.paths().root).string());
+    }
+    return absl::OkStatus();
+  });
+}
+
+class PostgresRows final : public RecordRows {
+ public:
+  PostgresRows(pqxx::dbtransaction& transaction, int64_t owner) : transaction_(transaction), owner_(owner) {}
+
+  absl::StatusOr<Row> FindSession(const std::string& session) override {
+    const pqxx::result found = transaction_.exec_prepared(sql::kFindSession, session);
+    Row row;
+    if (!found.empty()) {
+      row = {.id = found[0][0].as<int64_t>(), .own_epoch = found[0][1].as<int64_t>()};
+      row.epoch = row.own_epoch;
+    }
+    return row;
+  }
+
+  absl::StatusOr<int64_t> InsertSession(const std::string& session, int64_t epoch, const std::string& record) override {
+    return transaction_
+        .exec_prepared1(sql::kInsertSession, session, owner_, epoch, Blob(record), Checksum(KeyOf(session), record))[0]
+        .as<int64_t>();
+  }
+
+  absl::Status UpdateSession(const std::string& session, const Row& row, const std::string& record) override {
+    return Run(sql::kUpdateSession, *row.id, Blob(record), Checksum(KeyOf(session), record));
+  }
+
+  absl::Status DeleteSession(int64_t id) override { return Run(sql::kDeleteSession, id); }
+
+  absl::StatusOr<int64_t> NextStep(int64_t session) override {
+    return transaction_.exec_prepared1(sql::kNextStep, session)[0].as<int64_t>();
+  }
+
+  absl::Status InsertStep(int64_t session, int64_t number, int64_t kind, const std::string& record) override {
+    return Run(sql::kInsertStep, session, number, kind, Blob(record),
+               Checksum(KeyOfStep(session, number, kind), record));
+  }
+
+  absl::Status PutOperation(int64_t session, int64_t number, const std::string& record) override {
+    return Run(sql::kPutOperation, session, number, Blob(record), Checksum(KeyOfOperation(session, number), record));
+  }
+
+  absl::Status DropOperation(int64_t session, int64_t number) override {
+    return Run(sql::kDropOperation, session, number);
+  }
+
+  absl::Status InsertSizes(int64_t session, int64_t number, int64_t part, const std::string& record) override {
+    return Run(sql::kInsertSizes, session, number, part, Blob(record),
+               Checksum(KeyOfSizes(session, number, part), record));
+  }
+
+  absl::Status DropSizes(int64_t session, int64_t number) override { return Run(sql::kDropSizes, session, number); }
+
+  absl::StatusOr<bool> InsertAnswer(const store::v1::AnswerRecord& answer, const std::string& record) override {
+    const pqxx::result inserted = transaction_.exec_prepared(
+        sql::kInsertAnswer, Blob(answer.tenant()), Blob(answer.request_id()), Blob(record), answer.time_ns(),
+        Checksum(KeyOfAnswer(answer.tenant(), answer.request_id()), record));
+    return inserted.affected_rows() > 0;
+  }
+
+ private:
+  template <typename... Values>
+  absl::Status Run(const char* statement, const Values&... values) {
+    transaction_.exec_prepared0(statement, values...);
+    return absl::OkStatus();
+  }
+
+  pqxx::dbtransaction& transaction_;
+  const int64_t owner_;
+};
+
+}  // namespace
+
+PostgresRecords::PostgresRecords(const PostgresOptions& options, std::shared_ptr<StoreHealth> health)
+    : health_(std::move(health)),
+      writing_(options, PreparePostgres),
+      reading_(options, PreparePostgres),
+      owning_(options, PreparePostgres),
+      lease_(options.owner, options.lease, owning_, health_),
+      queue_([this](std::span<const SessionChange* const> changes, std::span<const AnswerKey> forgotten,
+                    Survives survives) { return ApplyTogether(changes, forgotten, survives); },
+             [] {}) {}
+
+absl::StatusOr<std::unique_ptr<PostgresRecords>> PostgresRecords::Open(const PostgresOptions& options,
+                                                                       std::shared_ptr<DataFolder> folder,
+                                                                       std::shared_ptr<StoreHealth> health) {
+  WELLSPACE_ASSIGN_OR_RETURN(const std::string shown, ShownPostgresAddress(options.address));
+  std::unique_ptr<PostgresRecords> records(new PostgresRecords(options, std::move(health)));
+  WELLSPACE_RETURN_IF_ERROR(OpenPostgresSchema(records->writing_));
+  if (folder != nullptr) {
+    WELLSPACE_RETURN_IF_ERROR(Pair(records->writing_, shown, *folder));
+  }
+  WELLSPACE_RETURN_IF_ERROR(records->lease_.Begin([&](pqxx::dbtransaction& transaction) {
+    TakeFromTheDead(transaction, records->lease_.owner(), records->lease_.epoch(), /*is_steady=*/true);
+    return absl::OkStatus();
+  }));
+  return records;
+}
+
+absl::Status PostgresRecords::ApplyTogether(std::span<const SessionChange* const> changes,
+                                            std::span<const AnswerKey> forgotten, Survives survives) {
+  WELLSPACE_RETURN_IF_ERROR(health_->Check());
+  return NoteFailure(writing_.Transact([&](pqxx::dbtransaction& transaction) -> absl::Status {
+    if (survives == Survives::kProcessDeath) {
+      transaction.exec0("SET LOCAL synchronous_commit = off");
+    }
+    for (const AnswerKey& key : forgotten) {
+      transaction.exec_prepared0(sql::kDropAnswer, Blob(key.tenant), Blob(key.request_id));
+    }
+    PostgresRows rows(transaction, lease_.owner());
+    for (const SessionChange* change : changes) {
+      try {
+        WELLSPACE_RETURN_IF_ERROR(WriteChange(rows, *change));
+      } catch (const pqxx::foreign_key_violation&) {
+        return OwnedElsewhere(change->session);  // this process is no owner any more
+      }
+    }
+    return absl::OkStatus();
+  }));
+}
+
+// Changes of before its end may be there or not: the next process finds out.
+absl::Status PostgresRecords::NoteFailure(const absl::Status& status) {
+  return absl::IsDataLoss(status) ? health_->Fail(status) : status;
+}
+
+absl::StatusOr<StoredSessions> PostgresRecords::Load() {
+  StoredSessions stored;
+  const absl::Status loaded = reading_.Read([&](pqxx::dbtransaction& transaction) -> absl::Status {
+    stored = {};
+    WELLSPACE_ASSIGN_OR_RETURN(stored.sessions, LoadSessions(transaction, absl::StrCat("owner = ", lease_.owner())));
+    for (const pqxx::row& row : transaction.exec(
+             "SELECT tenant, request_id, record, crc32c FROM wellspace.answers ORDER BY time, tenant, request_id")) {
+      WELLSPACE_ASSIGN_OR_RETURN(stored.answers.emplace_back(), ParseAnswer(row));
+    }
+    return absl::OkStatus();
+  });
+  WELLSPACE_RETURN_IF_ERROR(loaded);
+  return stored;
+}
+
+absl::StatusOr<std::optional<StoredSession>> PostgresRecords::Take(const std::string& session) {
+  WELLSPACE_RETURN_IF_ERROR(health_->Check());
+  std::optional<StoredSession> taken;
+  WELLSPACE_RETURN_IF_ERROR(NoteFailure(writing_.Transact([&](pqxx::dbtransaction& transaction) -> absl::Status {
+    taken.reset();
+    const pqxx::result rows = transaction.exec_prepared(sql::kTakeSession, session, lease_.owner());
+    if (rows.empty()) {
+      return absl::OkStatus();
+    }
+    WELLSPACE_ASSIGN_OR_RETURN(taken, ParseSession(rows[0]));
+    const auto id = rows[0][0].as<int64_t>();
+    return LoadSteps(transaction, absl::StrCat(id), {&*taken, 1}, {&id, 1});
+  })));
+  return taken;
+}
+
+absl::StatusOr<std::vector<StoredSession>> PostgresRecords::TakeOrphans() {
+  WELLSPACE_RETURN_IF_ERROR(health_->Check());
+  const bool is_steady = lease_.IsSteady();
+  bool has_dead = false;
+  WELLSPACE_RETURN_IF_ERROR(owning_.Read([&](pqxx::dbtransaction& transaction) {
+    has_dead = HasDeadOwners(transaction, lease_.owner(), is_steady);
+    return absl::OkStatus();
+  }));
+  std::vector<StoredSession> taken;
+  if (!has_dead) {
+    return taken;
+  }
+  WELLSPACE_RETURN_IF_ERROR(NoteFailure(reading_.Transact([&](pqxx::dbtransaction& transaction) -> absl::Status {
+    // Not that of this process: one that it has had may be that of a session which it gets back.
+    const auto epoch = transaction.exec1("SELECT nextval('wellspace.epochs')")[0].as<uint64_t>();
+    TakeFromTheDead(transaction, lease_.owner(), epoch, is_steady);
+    transaction.exec_params0("DELETE FROM wellspace.answers WHERE time < $1",
+                             absl::ToUnixNanos(absl::Now() - kKeptAnswers));
+    WELLSPACE_ASSIGN_OR_RETURN(
+        taken, LoadSessions(transaction, absl::StrCat("owner = ", lease_.owner(), " AND epoch = ", epoch)));
+    return absl::OkStatus();
+  })));
+  return taken;
+}
+
+absl::StatusOr<std::optional<SessionOwner>> PostgresRecords::FindOwner(const std::string& session) {
+  std::optional<SessionOwner> owner;
+  WELLSPACE_RETURN_IF_ERROR(owning_.Read([&](pqxx::dbtransaction& transaction) -> absl::Status {
+    owner.reset();
+    const pqxx::result rows = transaction.exec_prepared(sql::kFindOwner, session);
+    if (rows.empty()) {
+      return absl::OkStatus();
+    }
+    WELLSPACE_ASSIGN_OR_RETURN(const StoredSession found, ParseSession(rows[0]));
+    owner = SessionOwner{.tenant = found.state.tenant(),
+                         .address = rows[0][6].as<std::string>(),
+                         .is_self = rows[0][5].as<int64_t>() == lease_.owner(),
+                         .lives = rows[0][7].as<bool>()};
+    return absl::OkStatus();
+  }));
+  return owner;
+}
+
+absl::StatusOr<std::optional<store::v1::AnswerRecord>> PostgresRecords::FindAnswer(const AnswerKey& request) {
+  std::optional<store::v1::AnswerRecord> answer;
+  WELLSPACE_RETURN_IF_ERROR(reading_.Read([&](pqxx::dbtransaction& transaction) -> absl::Status {
+    const pqxx::result rows =
+        transaction.exec_prepared(sql::kReadAnswer, Blob(request.tenant), Blob(request.request_id));
+    if (rows.empty()) {
+      return absl::OkStatus();
+    }
+    WELLSPACE_ASSIGN_OR_RETURN(answer, ParseAnswer(rows[0]));
+    return absl::OkStatus();
+  }));
+  return answer;
+}
+
+absl::StatusOr<std::vector<store::v1::StepRecord::Features>> PostgresRecords::ReadFeatures(const std::string& session) {
+  std::vector<store::v1::StepRecord::Features> features;
+  WELLSPACE_RETURN_IF_ERROR(reading_.Read([&](pqxx::dbtransaction& transaction) -> absl::Status {
+    features.clear();
+    for (const pqxx::row& row : transaction.exec_prepared(sql::kReadFeatures, session, kFeaturesStep)) {
+      WELLSPACE_ASSIGN_OR_RETURN(store::v1::StepRecord step, ParseStep(row));
+      features.push_back(std::move(*step.mutable_features()));
+    }
+    return absl::OkStatus();
+  }));
+  return features;
+}
+
+absl::StatusOr<std::vector<StoredSizes>> PostgresRecords::ReadSizes(const std::string& session) {
+  std::vector<StoredSizes> sets;
+  WELLSPACE_RETURN_IF_ERROR(reading_.Read([&](pqxx::dbtransaction& transaction) -> absl::Status {
+    sets.clear();
+    for (const pqxx::row& row : transaction.exec_prepared(sql::kReadSizes, session)) {
+      const auto id = row[0].as<int64_t>();
+      const auto number = row[1].as<int64_t>();
+      const auto part = row[2].as<int64_t>();
+      if (sets.empty() || sets.back().number != static_cast<uint64_t>(number)) {
+        sets.push_back({.number = static_cast<uint64_t>(number), .parts = {}});
+      }
+      WELLSPACE_ASSIGN_OR_RETURN(sets.back().parts.emplace_back(),
+                                 Parse<store::v1::SizesRecord>(
+                                     KeyOfSizes(id, number, part), row, 3,
+                                     absl::StrCat("part ", part, " of sizes ", number, " of session '", session, "'")));
+    }
+    return absl::OkStatus();
+  }));
+  return sets;
+}
+
+absl::StatusOr<std::optional<store::v1::SessionRecord>> PostgresRecords::ReadRecord(const std::string& session) {
+  std::optional<store::v1::SessionRecord> record;
+  WELLSPACE_RETURN_IF_ERROR(reading_.Read([&](pqxx::dbtransaction& transaction) -> absl::Status {
+    record.reset();
+    const pqxx::result rows = transaction.exec_prepared(sql::kReadSession, session);
+    if (!rows.empty()) {
+      WELLSPACE_ASSIGN_OR_RETURN(StoredSession found, ParseSession(rows[0]));
+      record = std::move(found.state);
+    }
+    return absl::OkStatus();
+  }));
+  return record;
+}
+
+absl::StatusOr<Census> PostgresRecords::ReadCensus() {
+  Census census;
+  WELLSPACE_RETURN_IF_ERROR(reading_.Read([&](pqxx::dbtransaction& transaction) -> absl::Status {
+    census = {};
+    // An owner lives until its sessions are taken, whatever its lease: it may still have a change under way.
+    const pqxx::row owners = transaction.exec1(
+        absl::StrCat("SELECT min(epoch), count(*) FILTER (WHERE id = ", lease_.owner(), ") FROM wellspace.owners"));
+    if (owners[1].as<int64_t>() == 0) {
+      return OwnedElsewhere("each session");
+    }
+    census.oldest_epoch = owners[0].as<uint64_t>();
+    for (const pqxx::row& row :
+         transaction.exec("SELECT id, name, epoch, state, crc32c FROM wellspace.sessions ORDER BY id")) {
+      WELLSPACE_ASSIGN_OR_RETURN(StoredSession session, ParseSession(row));
+      census.sessions.push_back(std::move(session.state));
+    }
+    return absl::OkStatus();
+  }));
+  return census;
+}
+
+}  // namespace wellspace::server

@@ -1,0 +1,368 @@
+// Real servers that share a PostgreSQL and a folder: where one ends, dies or stands still, another goes on.
+#include <signal.h>
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <memory>
+#include <optional>
+#include <random>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "absl/cleanup/cleanup.h"
+#include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+#include "tests/server/daemon.h"
+#include "tests/server/recorder.h"
+#include "tests/server/session_calls.h"
+#include "tests/server/store/postgres_server.h"
+#include "tests/server/store/store_support.h"
+#include "tests/server/subprocess.h"
+#include "tests/support/amount.h"
+
+namespace wellspace::server {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::SizeIs;
+
+// Faults among clients that go on; the long test has more.
+const int kFaults = test::Amount("WELLSPACE_FAULTS", 6);
+constexpr int kClients = 3;
+constexpr absl::Duration kLease = absl::Seconds(2);
+
+std::string TextOfFile(const std::string& path) {
+  std::ifstream file(path);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+class ReplicasTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (const std::string why = PostgresServer::WhyNot(); !why.empty()) {
+      GTEST_SKIP() << why;
+    }
+    store_ = PostgresServer::OfThisProgram().NewDatabase();
+  }
+
+  std::vector<std::string> Options(const std::string& name) const {
+    return {"--data",
+            folder_.path(),
+            "--store",
+            store_,
+            "--replica",
+            name,
+            "--lease",
+            absl::StrCat(absl::ToDoubleSeconds(kLease)),
+            "--log-level",
+            "info",
+            "--workers",
+            "1",
+            "--max-sessions-per-tenant",
+            "1000000",
+            "--max-sessions",
+            "1000000"};
+  }
+  std::string ErrorPath(const std::string& name) const { return absl::StrCat(errors_.path(), "/", name); }
+  std::unique_ptr<Daemon> Start(const std::string& name) const {
+    return std::make_unique<Daemon>(Options(name), ErrorPath(name));
+  }
+  static SessionCalls CallsOf(Daemon& daemon) {
+    return SessionCalls(grpc::CreateChannel(daemon.address(), grpc::InsecureChannelCredentials()));
+  }
+  // Until `daemon` has the session, or a minute is over.
+  static v1::Session AwaitSession(Daemon& daemon, const std::string& name) {
+    SessionCalls calls = CallsOf(daemon);
+    const absl::Time deadline = absl::Now() + absl::Minutes(1);
+    grpc::Status status;
+    v1::Session session;
+    do {
+      session = calls.Get(name, &status);
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    } while (!status.ok() && absl::Now() < deadline);
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    return session;
+  }
+  // Makes a session that is refined.
+  static std::string MakeSession(Daemon& daemon) {
+    SessionCalls calls = CallsOf(daemon);
+    const std::string name = calls.Create(2).name();
+    calls.Upload(name, 0, UniformPoints(300, 2, 1));
+    EXPECT_EQ(calls.Refine(name).state(), v1::Operation::STATE_SUCCEEDED);
+    return name;
+  }
+  // That every kind of call works on a session that was made by another server, whose mesh was `mesh`.
+  static void UseSession(Daemon& daemon, const std::string& name, const std::string& mesh) {
+    SessionCalls calls = CallsOf(daemon);
+    EXPECT_EQ(calls.MeshBytes(name), mesh);
+    EXPECT_THAT(calls.List({}).sessions(), SizeIs(1));
+    EXPECT_THAT(calls
+                    .ListOperations([&] {
+                      v1::ListOperationsRequest request;
+                      request.set_parent(name);
+                      return request;
+                    }())
+                    .operations(),
+                SizeIs(1));
+    grpc::ClientContext context;
+    v1::AddVerticesRequest add;
+    add.set_name(name);
+    add.mutable_points()->Add(0.501);
+    add.mutable_points()->Add(0.499);
+    v1::AddVerticesResponse added;
+    EXPECT_TRUE(calls.queries().AddVertices(&context, add, &added).ok());
+    const uint64_t points = calls.Get(name).committed_points();
+    calls.Upload(name, points, UniformPoints(50, 2, 2));
+    EXPECT_EQ(calls.Refine(name).state(), v1::Operation::STATE_SUCCEEDED);
+    v1::UpdateSessionRequest update;
+    update.mutable_session()->set_name(name);
+    update.mutable_update_mask()->add_paths("labels");
+    (*update.mutable_session()->mutable_labels())["a"] = "b";
+    EXPECT_EQ(calls.Update(update).labels().at("a"), "b");
+    v1::RemovePointsRequest remove;
+    remove.set_name(name);
+    remove.add_points(0);
+    EXPECT_EQ(calls.RemovePoints(remove).committed_points(), points + 49);
+    EXPECT_EQ(calls.Refine(name).state(), v1::Operation::STATE_SUCCEEDED);
+    calls.Delete(name);
+  }
+
+  const TestFolder folder_;
+  const TestFolder errors_;
+  std::string store_;
+};
+
+TEST_F(ReplicasTest, ASessionIsFoundWhereItIs) {
+  const auto first = Start("first");
+  const auto second = Start("second");
+  const std::string name = MakeSession(*first);
+  SessionCalls calls = CallsOf(*second);
+  grpc::Status status;
+  calls.Get(name, &status);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::UNAVAILABLE);
+  EXPECT_EQ(DetailsOf(status).reason, "SESSION_ELSEWHERE");
+  EXPECT_EQ(DetailsOf(status).address, first->address());
+  EXPECT_TRUE(DetailsOf(status).may_retry);
+  calls.Get("sessions/00000000000000000000000000000000", &status);
+  EXPECT_EQ(DetailsOf(status).reason, "SESSION_NOT_FOUND");
+  const std::string other = calls.Create(2).name();
+  CallsOf(*first).Get(other, &status);
+  EXPECT_EQ(DetailsOf(status).address, second->address());
+  calls.Delete(other);
+  CallsOf(*first).Get(other, &status);
+  EXPECT_EQ(DetailsOf(status).reason, "SESSION_NOT_FOUND");
+}
+
+TEST_F(ReplicasTest, WhoIsKilledIsTakenOver) {
+  auto first = Start("first");
+  const auto second = Start("second");
+  const std::string name = MakeSession(*first);
+  const std::string mesh = CallsOf(*first).MeshBytes(name);
+  first->process().Signal(SIGKILL);
+  first->process().Wait();
+  const absl::Time dead = absl::Now();
+  AwaitSession(*second, name);
+  EXPECT_LT(absl::Now() - dead, kLease + absl::Seconds(20)) << "no more than the lease, and a busy machine";
+  UseSession(*second, name, mesh);
+  EXPECT_THAT(TextOfFile(ErrorPath("second")), HasSubstr("event=taken_over sessions=1"));
+}
+
+// A server that is stopped gives its sessions back at once, and its work.
+TEST_F(ReplicasTest, WhoIsDrainedHandsOver) {
+  auto first = std::make_unique<Daemon>([&] {
+    std::vector<std::string> options = Options("first");
+    options.insert(options.end(), {"--grace", "0"});
+    return options;
+  }());
+  const std::string name = MakeSession(*first);
+  const std::string mesh = CallsOf(*first).MeshBytes(name);
+  const auto second = Start("second");
+  first->Stop();
+  AwaitSession(*second, name);
+  UseSession(*second, name, mesh);
+}
+
+// It stands still for longer than its lease, and goes on: what it has is another's by then.
+TEST_F(ReplicasTest, WhoStoodStillChangesNothing) {
+  const auto first = Start("first");
+  const auto second = Start("second");
+  const std::string name = MakeSession(*first);
+  const std::string mesh = CallsOf(*first).MeshBytes(name);
+  SessionCalls old = CallsOf(*first);
+  const uint64_t points = old.Get(name).committed_points();
+  first->process().Signal(SIGSTOP);
+  AwaitSession(*second, name);
+  SessionCalls calls = CallsOf(*second);
+  // Of requests that wait for it while it stands still, none is done.
+  std::atomic<int> done = 0;
+  std::vector<std::jthread> waiting;
+  for (int i = 0; i < 4; ++i) {
+    waiting.emplace_back([&, i] {
+      grpc::Status status;
+      old.Upload(name, points, {0.1 * i, 0.5}, &status);
+      done += status.ok() ? 1 : 0;
+      v1::UpdateSessionRequest update;
+      update.mutable_session()->set_name(name);
+      update.mutable_update_mask()->add_paths("labels");
+      (*update.mutable_session()->mutable_labels())["by"] = "the old one";
+      old.Update(update, &status);
+      done += status.ok() ? 1 : 0;
+      old.Get(name, &status);
+      done += status.ok() ? 1 : 0;
+    });
+  }
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  first->process().Signal(SIGCONT);
+  waiting.clear();
+  EXPECT_EQ(done, 0);
+  EXPECT_EQ(first->process().Wait(), 1) << "it has nothing any more, and is to be started again";
+  EXPECT_THAT(TextOfFile(ErrorPath("first")), HasSubstr("the lease ran out"));
+  EXPECT_EQ(calls.Get(name).committed_points(), points);
+  EXPECT_TRUE(calls.Get(name).labels().empty());
+  UseSession(*second, name, mesh);
+  const auto again = Start("first");
+  EXPECT_EQ(CallsOf(*again).List({}).sessions_size(), 0);
+}
+
+TEST_F(ReplicasTest, TwoOfOneNameDoNotServeAtOnce) {
+  const auto first = Start("one");
+  std::vector<std::string> options = Options("one");
+  options.insert(options.end(), {"--listen", "127.0.0.1:0"});
+  Subprocess second("wellspaced", options, ErrorPath("second"));
+  EXPECT_EQ(second.Wait(), 1);
+  EXPECT_THAT(TextOfFile(ErrorPath("second")), HasSubstr("another server with the name 'one'"));
+  EXPECT_EQ(MakeSession(*first).substr(0, 9), "sessions/");
+}
+
+TEST_F(ReplicasTest, ThePasswordIsNowhere) {
+  // Trusted by this server, whatever the password is.
+  store_.replace(store_.find("@"), 1, ":s%45cret@");
+  {
+    const auto first = Start("first");
+    MakeSession(*first);
+    first->Stop();
+  }
+  EXPECT_THAT(TextOfFile(ErrorPath("first")),
+              AllOf(HasSubstr("store=postgresql://tester@127.0.0.1"), Not(HasSubstr("cret"))));
+  EXPECT_THAT(TextOfFile(absl::StrCat(folder_.path(), "/store")), Not(HasSubstr("cret")));
+  const auto fails = [&](const std::string& store) {
+    store_ = store;
+    std::vector<std::string> options = Options("first");
+    options.insert(options.end(), {"--listen", "127.0.0.1:0"});
+    Subprocess process("wellspaced", options, ErrorPath("failed"));
+    EXPECT_GT(process.Wait(), 0);
+    std::string text = TextOfFile(ErrorPath("failed"));
+    std::remove(ErrorPath("failed").c_str());
+    return text;
+  };
+  EXPECT_THAT(fails("postgresql://tester:s%45cret@127.0.0.1:1/none"),
+              AllOf(HasSubstr("postgresql://tester@127.0.0.1:1/none"), Not(HasSubstr("cret"))));
+  EXPECT_THAT(fails("postgresql://tester:s%4cret@host/db"), AllOf(HasSubstr("--store"), Not(HasSubstr("cret"))));
+  EXPECT_THAT(fails("postgresql://tester@host/db?passwort=secret"),
+              AllOf(HasSubstr("--store"), Not(HasSubstr("cret"))));
+}
+
+// Two of them, each of which comes back where clients look for it.
+class MortalReplicas {
+ public:
+  using Options = std::function<std::vector<std::string>(const std::string& name)>;
+
+  MortalReplicas(Options options, std::string errors) : options_(std::move(options)), errors_(std::move(errors)) {
+    for (size_t i = 0; i < kNames.size(); ++i) {
+      addresses_.push_back("127.0.0.1:0");
+      servers_.emplace_back();
+      Start(i);
+      addresses_[i] = servers_[i]->address();
+    }
+  }
+
+  const std::vector<std::string>& addresses() const { return addresses_; }
+
+  // A fault of one of them, or of the database.
+  void Suffer(int fault, size_t which) {
+    if (fault % 4 == 3) {
+      PostgresServer::OfThisProgram().Kill();
+      PostgresServer::OfThisProgram().Start();
+      return;
+    }
+    Subprocess& process = servers_[which]->process();
+    if (fault % 4 == 2) {
+      process.Signal(SIGSTOP);
+      std::this_thread::sleep_for(absl::ToChronoMilliseconds(kLease + absl::Seconds(2)));
+      process.Signal(SIGCONT);
+      std::this_thread::sleep_for(std::chrono::milliseconds(300));  // it answers those who have waited for it
+    }
+    process.Signal(fault % 4 == 0 ? SIGKILL : SIGTERM);
+    process.Wait();
+    Start(which);
+  }
+
+  void Stop() {
+    for (const auto& server : servers_) {
+      server->Stop();
+    }
+  }
+
+ private:
+  static constexpr std::array<const char*, 2> kNames = {"first", "second"};
+
+  void Start(size_t i) {
+    std::vector<std::string> options = options_(kNames[i]);
+    options.insert(options.end(), {"--grace", "1", "--listen", addresses_[i]});
+    servers_[i] = std::make_unique<Daemon>(options, absl::StrCat(errors_, "/", kNames[i]), "", Daemon::Listen::kAsTold);
+  }
+
+  const Options options_;
+  const std::string errors_;
+  std::vector<std::string> addresses_;
+  std::vector<std::unique_ptr<Daemon>> servers_;
+};
+
+// Servers die, are drained and stand still, and the database is restarted, while clients go on: all that any server has
+// acknowledged is there, each request was done once.
+TEST_F(ReplicasTest, NothingIsLostAmongClientsThatGoOn) {
+  const uint32_t seed = std::random_device()();
+  SCOPED_TRACE(absl::StrCat("seed ", seed));
+  std::minstd_rand random(seed);
+  MortalReplicas replicas([this](const std::string& name) { return Options(name); }, errors_.path());
+  std::atomic<bool> is_over = false;
+  std::vector<std::unique_ptr<Recorder>> clients;
+  std::vector<std::jthread> threads;
+  const absl::Cleanup end = [&] { is_over = true; };  // an exception, too, is no reason to wait for ever
+  for (int i = 0; i < kClients; ++i) {
+    clients.push_back(std::make_unique<Recorder>(replicas.addresses(), i, is_over));
+    threads.emplace_back([client = clients.back().get()] { client->Run(); });
+  }
+  for (int i = 0; i < kFaults && !HasFailure(); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(200 + random() % 1000));
+    replicas.Suffer(i, random() % replicas.addresses().size());
+  }
+  is_over = true;
+  int lives = 0;
+  int redirected = 0;
+  for (int i = 0; i < kClients; ++i) {
+    threads[i].join();
+    lives += clients[i]->lives();
+    redirected += clients[i]->redirected();
+  }
+  EXPECT_GT(lives, 0);
+  for (const auto& client : clients) {
+    client->CheckAll();
+  }
+  replicas.Stop();
+  RecordProperty("sessions", lives);
+  RecordProperty("redirected", redirected);
+}
+
+}  // namespace
+}  // namespace wellspace::server
