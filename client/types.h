@@ -95,6 +95,7 @@ struct SurfaceFeatures {
   std::optional<double> weld{};
   std::optional<double> min_patch{};
   std::optional<double> resolution{};  // of kWinding
+  bool keeps_points = false;
 };
 
 // The fidelity of a mesh to its surface; see the proto's SurfaceParameters.
@@ -201,6 +202,7 @@ struct SurfaceStatistics {
   double min_facet_angle_deg = 0;
   double deviation_of_facets = 0;
   double deviation_of_surface = 0;
+  double lost_area = 0;
   std::vector<double> volumes;  // by region
 };
 

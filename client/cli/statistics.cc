@@ -48,6 +48,11 @@ std::string DeviationText(const client::SurfaceStatistics& surface) {
     absl::StrAppendFormat(&text, "; %s tetrahedra at creases below 75 degrees, the others have %.4g at least",
                           WithThousands(surface.tube_simplices), surface.min_angle_outside_deg);
   }
+  if (surface.lost_area > 0) {
+    absl::StrAppendFormat(
+        &text, "; parts thinner than the resolution, or turned inside out, are lost: triangles of an area of %.3g",
+        surface.lost_area);
+  }
   if (surface.lost_ridges > 0) {
     absl::StrAppend(&text, "; ", WithThousands(surface.lost_ridges), " parts of creases are lost");
   }

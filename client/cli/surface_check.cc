@@ -103,7 +103,7 @@ void SurfaceCheck::AddTo(CLI::App& command) {
   // A file of any content is a surface here.
   command.remove_option(command.get_option("--as-points"));
   command.remove_option(command.get_option("--triangles"));
-  for (const char* name : {"--solids", "--crease-angle", "--weld", "--resolution"}) {
+  for (const char* name : {"--solids", "--crease-angle", "--weld", "--resolution", "--keep-points"}) {
     command.get_option(name)->needs("--surface");
   }
   AddLength(command, "--tolerance", tolerance_,

@@ -171,6 +171,7 @@ Json SurfaceJson(const std::string& path, const formats::Surface& surface, const
   json["loose_points"] = report.loose_points;
   json["components"] = report.components;
   json["area"] = report.area;
+  json["lost_area"] = report.lost_area;
   json["volume"] = report.volume.has_value() ? Json(*report.volume) : Json(nullptr);
   json["solids"] = report.volume.has_value() ? Json(report.solids) : Json(nullptr);
   json["membranes"] = report.volume.has_value() ? Json(report.membranes) : Json(nullptr);
@@ -203,6 +204,11 @@ void PrintSurface(const Json& json) {
   PrintChanges(json);
   PrintLine("components", WithThousands(json["components"]));
   PrintLine("area", absl::StrFormat("%.9g", json["area"].get<double>()));
+  if (json["lost_area"].get<double>() > 0) {
+    PrintLine("lost", absl::StrFormat("triangles of an area of %.4g: around parts thinner than the resolution, or that "
+                                      "go the other way than most",
+                                      json["lost_area"].get<double>()));
+  }
   if (!json["volume"].is_null()) {
     const size_t solids = json["solids"].size();
     PrintLine("volume", absl::StrFormat("%.9g%s", json["volume"].get<double>(),

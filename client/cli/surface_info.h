@@ -12,8 +12,8 @@ namespace wellspace::cli {
 
 // file, kind ("surface"), format, dimension, triangles, points, low, high, parts, cut_polygons, weld, welded_points,
 // flat_triangles, flat_example, equal_triangles, equal_example, flipped_triangles, flipped_example, one_sided,
-// inside_out, loose_points, components, area, volume, solids, membranes, curves, corners, patches, sharpest_angle_deg,
-// sharpest_at, faults. Values that faults leave open are null.
+// inside_out, loose_points, components, area, lost_area, volume, solids, membranes, curves, corners, patches,
+// sharpest_angle_deg, sharpest_at, faults. Values that faults leave open are null.
 Json SurfaceJson(const std::string& path, const formats::Surface& surface, const core::SurfaceFeatures& features,
                  const core::SurfaceReport& report);
 

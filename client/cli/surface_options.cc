@@ -53,6 +53,10 @@ void SurfaceOptions::AddTo(CLI::App& command, const std::string& what) {
             "Corners no farther than this from each other become one: a length, or with % a share of the diagonal; "
             "default: 0.0001% for .stl, otherwise 0",
             Length::Whole::kDiagonal);
+  command.add_flag(
+      "--keep-points", keeps_points_,
+      "Corners of triangles are vertices of the mesh, with their numbers and coordinates; for surfaces that "
+      "are good meshes: long triangles take far more vertices then");
 }
 
 void SurfaceOptions::AddMoreTo(CLI::App& command, const std::string& what) {
@@ -106,6 +110,7 @@ absl::Status SurfaceOptions::CheckOther(const std::string& what) const {
                              : crease_angle_.has_value() ? "--crease-angle"
                              : weld_.has_value()         ? "--weld"
                              : resolution_.has_value()   ? "--resolution"
+                             : keeps_points_             ? "--keep-points"
                              : !seeds_path_.empty()      ? "--seeds"
                                                          : nullptr;
   return option == nullptr ? absl::OkStatus()
@@ -150,6 +155,7 @@ core::SurfaceFeatures SurfaceOptions::FeaturesOf(const formats::Surface& surface
   features.resolution = resolution_.has_value() ? resolution_->Of(surface.points, 3) : 0;
   features.crease_angle = crease_angle_.value_or(features.crease_angle);
   features.weld = weld_.has_value() ? weld_->Of(surface.points, 3) : client::DefaultWeld(surface);
+  features.keeps_points = keeps_points_;
   return features;
 }
 
@@ -171,6 +177,7 @@ absl::StatusOr<formats::PointCloud> SurfaceOptions::ReadInput(const std::string&
   }
   features.crease_angle = rules.crease_angle;
   features.weld = rules.weld;
+  features.keeps_points = rules.keeps_points;
   features_ = std::make_shared<const client::SurfaceFeatures>(std::move(features));
   formats::PointCloud cloud;
   cloud.name = surface_->name;

@@ -100,6 +100,7 @@ class SurfaceOptions {
   std::optional<double> crease_angle_;
   std::optional<Length> weld_;
   std::optional<Length> resolution_;
+  bool keeps_points_ = false;
   std::string seeds_path_;
   std::string path_;
   std::optional<formats::Surface> surface_;

@@ -61,6 +61,7 @@ SurfaceFeatures SurfaceFromProto(const v1::SurfaceOptions& message) {
   surface.weld = get(message.has_weld(), message.weld());
   surface.min_patch = get(message.has_min_patch(), message.min_patch());
   surface.resolution = get(message.has_resolution(), message.resolution());
+  surface.keeps_points = message.keep_points();
   return surface;
 }
 
@@ -152,6 +153,7 @@ SurfaceStatistics SurfaceFromProto(const v1::SurfaceStatistics& surface) {
           .min_facet_angle_deg = surface.min_facet_angle_deg(),
           .deviation_of_facets = surface.deviation_of_facets(),
           .deviation_of_surface = surface.deviation_of_surface(),
+          .lost_area = surface.lost_area(),
           .volumes = VectorOf(surface.volumes())};
 }
 

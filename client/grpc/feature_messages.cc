@@ -117,6 +117,7 @@ size_t FillSurface(const SurfaceFeatures& surface, size_t first, v1::SurfaceOpti
   set(surface.weld, &v1::SurfaceOptions::set_weld);
   set(surface.min_patch, &v1::SurfaceOptions::set_min_patch);
   set(surface.resolution, &v1::SurfaceOptions::set_resolution);
+  options.set_keep_points(surface.keeps_points);
   for (; first < end; ++first) {
     const SolidSeed& seed = surface.seeds[first];
     v1::SolidSeed& message = *options.add_seeds();

@@ -54,6 +54,7 @@ Json SurfaceJson(const SurfaceStatistics& surface) {
           {"min_facet_angle_deg", surface.min_facet_angle_deg},
           {"deviation_of_facets", surface.deviation_of_facets},
           {"deviation_of_surface", surface.deviation_of_surface},
+          {"lost_area", surface.lost_area},
           {"volumes", surface.volumes}};
 }
 

@@ -131,6 +131,7 @@ class Preparer {
     WELLSPACE_ASSIGN_OR_RETURN(complex_, MakeSurfaceComplex(given.points, place_of, wrapped, context_));
     complex_.point_of_input.resize(points_.size() / 3);
     complex_.sources.assign(complex_.sources.size(), 0);  // no triangle of the wrap is a given one
+    report_.lost_area = wrap.lost_area / (frame_.scale * frame_.scale);
     return absl::OkStatus();
   }
 
@@ -380,6 +381,11 @@ absl::Status CheckSurfaceFeatures(std::span<const double> points, const SurfaceF
   if (features.resolution > 0 && features.solids != SolidRule::kWinding) {
     return absl::InvalidArgumentError(absl::StrCat("resolution: it is of solids by winding alone, and it is ",
                                                    features.resolution, "; leave it out"));
+  }
+  if (features.keeps_points && features.solids == SolidRule::kWinding) {
+    return absl::InvalidArgumentError(
+        "keep_points: what is made of triangles by winding has none of their points; leave it out, or give solids by "
+        "even-odd or holes");
   }
   return absl::OkStatus();
 }

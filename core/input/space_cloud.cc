@@ -60,6 +60,9 @@ class CloudMaker {
     WELLSPACE_RETURN_IF_ERROR(CheckAngles(angles));
     WELLSPACE_RETURN_IF_ERROR(domain_->BuildIndex(MortonGrid<3>(frame_.scaled_box), context_));
     WELLSPACE_RETURN_IF_ERROR(TakeCreases(angles));
+    if (features_.keeps_points) {
+      WELLSPACE_RETURN_IF_ERROR(CheckKeeping(angles));
+    }
     WELLSPACE_RETURN_IF_ERROR(FindRoles());
     WELLSPACE_RETURN_IF_ERROR(TakePoints());
     WELLSPACE_RETURN_IF_ERROR(SampleCurves());
@@ -188,8 +191,64 @@ class CloudMaker {
     return absl::OkStatus();
   }
 
-  // Takes the given points that are vertices: corners, and points on no triangle in a solid that is meshed.
+  // Vertices around acute creases have places of their own, where given points would be in their way.
+  absl::Status CheckKeeping(const CreaseAngles& angles) const {
+    if (domain_->creases().IsEmpty()) {
+      return absl::OkStatus();
+    }
+    const PlacedAngle* sharpest = nullptr;
+    for (const std::vector<PlacedAngle>* const some : {&angles.of_curves, &angles.of_corners}) {
+      for (const PlacedAngle& of : *some) {
+        sharpest = sharpest == nullptr || of.angle < sharpest->angle ? &of : sharpest;
+      }
+    }
+    return absl::InvalidArgumentError(
+        absl::StrFormat("keep_points: the surface is sharp, %.4g degrees at %s; expected at least %g degrees "
+                        "everywhere, or leave it out",
+                        sharpest->angle, PlaceText(frame_.Unscaled(sharpest->at)), kAcuteAngle));
+  }
+
+  // Finds the places of the points that triangles at meshed solids have for corners, but for corners of curves.
+  absl::Status FindKept() {
+    place_of_kept_.resize(complex().points.size());
+    uint64_t count = 0;
+    const auto keep = [&](uint32_t point, const SpacePlace& place) {
+      count += place_of_kept_[point].IsOnSurface() ? 0 : 1;
+      place_of_kept_[point] = place;
+    };
+    for (uint32_t t = 0; t < complex().triangles.size(); ++t) {
+      WELLSPACE_RETURN_IF_ERROR(CheckAt(t, context_));
+      const SpacePlace place{SpacePlace::Kind::kPatch, curves().patch_of[t], 0};
+      if (domain_->IsMeshedAt(place)) {
+        for (const uint32_t point : complex().triangles[t]) {
+          keep(point, place);
+        }
+      }
+    }
+    for (uint32_t curve = 0; curve < domain_->curve_count(); ++curve) {
+      WELLSPACE_RETURN_IF_ERROR(CheckAt(curve, context_));
+      const std::span<const uint32_t> points = curves().PointsOf(curve);
+      for (size_t i = 0; i + 1 < points.size(); ++i) {
+        const SpacePlace place{SpacePlace::Kind::kCurve, curve, domain_->ArcsOf(curve)[i]};
+        if (domain_->IsMeshedAt(place)) {
+          keep(points[i], place);
+        }
+      }
+    }
+    if (count > max_vertices_) {
+      return absl::ResourceExhaustedError(absl::StrCat("keep_points: triangles at meshed solids have ", count,
+                                                       " points for corners, more than max_vertices = ", max_vertices_,
+                                                       "; raise it, or leave keep_points out"));
+    }
+    return context_.AllowMemory(domain_->MemoryBytes() + count * kBytesOfFirst);
+  }
+
+  // Takes the given points that are vertices: corners, points on no triangle in a solid that is meshed, and those that
+  // are kept.
   absl::Status TakePoints() {
+    if (features_.keeps_points) {
+      WELLSPACE_RETURN_IF_ERROR(FindKept());
+    }
     std::vector<bool> is_used(complex().points.size());
     for (size_t t = 0; t < complex().triangles.size(); ++t) {
       WELLSPACE_RETURN_IF_ERROR(CheckAt(t, context_));
@@ -213,6 +272,8 @@ class CloudMaker {
       if (corner != curves().corners.end() && *corner == point) {
         const auto number = static_cast<uint32_t>(corner - curves().corners.begin());
         TakePoint(i, point, {SpacePlace::Kind::kCorner, number, 0});
+      } else if (features_.keeps_points && place_of_kept_[point].IsOnSurface()) {
+        TakePoint(i, point, place_of_kept_[point]);
       } else if (!is_used[point]) {
         const uint32_t solid = domain_->index().SolidAt(complex().points[point]);
         if (!domain_->IsMeshed(solid)) {
@@ -253,16 +314,15 @@ class CloudMaker {
         }
         continue;
       }
+      if (features_.keeps_points && domain_->IsMeshedAt({SpacePlace::Kind::kCurve, curve, 0})) {
+        WELLSPACE_RETURN_IF_ERROR(SampleBetweenKept(curve));
+        continue;
+      }
       const double length = domain_->LengthOf(curve);
       const size_t least = !domain_->IsLoop(curve) ? 1 : has_corner ? kPartsOfCornerLoop : kPartsOfLoop;
       const double most = std::min(length / curve_edge_, kMostParts);
       const size_t parts = std::max(least, static_cast<size_t>(std::ceil(most * (1 - 1e-12))));
-      if (first_.size() + parts > max_vertices_) {
-        return absl::ResourceExhaustedError(
-            absl::StrCat("triangles: the curves of the surface take more than max_vertices = ", max_vertices_,
-                         " vertices; raise max_vertices, or the edge length that is asked for"));
-      }
-      WELLSPACE_RETURN_IF_ERROR(context_.AllowMemory(domain_->MemoryBytes() + (first_.size() + parts) * kBytesOfFirst));
+      WELLSPACE_RETURN_IF_ERROR(AllowOnCurves(parts));
       for (size_t i = has_corner ? 1 : 0; i < parts; ++i) {
         WELLSPACE_RETURN_IF_ERROR(CheckAt(i, context_));
         const double arc = length * (static_cast<double>(i) / static_cast<double>(parts));
@@ -272,6 +332,31 @@ class CloudMaker {
     first_collar_ = static_cast<uint32_t>(first_.size());
     for (const AcuteCreases::Collar& collar : domain_->creases().collars) {
       first_.push_back({frame_.Unscaled(collar.at), {SpacePlace::Kind::kCollar, collar.patch, 0}, 0});
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status AllowOnCurves(size_t more) const {
+    if (first_.size() + more > max_vertices_) {
+      return absl::ResourceExhaustedError(
+          absl::StrCat("triangles: the curves of the surface take more than max_vertices = ", max_vertices_,
+                       " vertices; raise max_vertices, or the edge length that is asked for"));
+    }
+    return context_.AllowMemory(domain_->MemoryBytes() + (first_.size() + more) * kBytesOfFirst);
+  }
+
+  // Divides the pieces of a curve between points that are kept.
+  absl::Status SampleBetweenKept(uint32_t curve) {
+    const std::span<const double> arcs = domain_->ArcsOf(curve);
+    const bool is_divided = domain_->IsLoop(curve) && arcs.size() - 1 < kPartsOfCornerLoop;
+    for (size_t i = 0; i + 1 < arcs.size(); ++i) {
+      const double most = std::min((arcs[i + 1] - arcs[i]) / curve_edge_, kMostParts);
+      const size_t parts = std::max<size_t>(is_divided ? 2 : 1, static_cast<size_t>(std::ceil(most * (1 - 1e-12))));
+      WELLSPACE_RETURN_IF_ERROR(AllowOnCurves(parts));
+      for (size_t part = 1; part < parts; ++part) {
+        WELLSPACE_RETURN_IF_ERROR(CheckAt(part, context_));
+        AddOnCurve(curve, arcs[i] + (arcs[i + 1] - arcs[i]) * (static_cast<double>(part) / static_cast<double>(parts)));
+      }
     }
     return absl::OkStatus();
   }
@@ -376,9 +461,10 @@ class CloudMaker {
   SpaceFigures figures_;
   std::unique_ptr<SpatialDomain> domain_;
   std::vector<First> first_;
-  uint32_t first_collar_ = 0;             // in first_
-  std::vector<uint32_t> first_of_point_;  // by point of the complex: in first_, or kNoFirst
-  std::vector<uint32_t> input_of_point_;  // by point of the complex: the first given one
+  uint32_t first_collar_ = 0;              // in first_
+  std::vector<SpacePlace> place_of_kept_;  // by point of the complex: on the surface; kSolid: it is not kept
+  std::vector<uint32_t> first_of_point_;   // by point of the complex: in first_, or kNoFirst
+  std::vector<uint32_t> input_of_point_;   // by point of the complex: the first given one
 };
 
 }  // namespace

@@ -56,6 +56,7 @@ std::string WordsOf(SurfaceFault::Kind kind);
 // Errors:     INVALID_ARGUMENT always: how many there are, the first place, what would be accepted.
 absl::Status ErrorOf(const SurfaceFault& fault);
 
+// With SolidRule::kWinding `components` and all below it are those of the wrap.
 struct SurfaceReport {
   Box<3> box{};                    // of the triangles' corners
   uint64_t points = 0;             // that triangles have for corners, once they are clean
@@ -66,6 +67,7 @@ struct SurfaceReport {
   uint64_t flat_triangles = 0;     // dropped: without an area
   uint64_t equal_triangles = 0;    // dropped: beyond the first over the same corners
   uint64_t flipped_triangles = 0;  // that go against most of the others around them
+  double lost_area = 0;            // of solids by winding: of triangles around nothing that is meshed
   // The first of each of these three kinds, by its lowest corner; without triangles, if there is none.
   FaultPlace flat_at;
   FaultPlace equal_at;

@@ -42,8 +42,9 @@ constexpr int kHalvings = 10;
 
 constexpr size_t kCellsTogether = 1 << 15;
 constexpr size_t kCellsBetweenChecks = 32;
-constexpr double kMostAdded = 4;        // times kMostWrapCells: of needles, and at gaps
-constexpr uint64_t kBytesOfCell = 700;  // nodes, corners and triangles of a cell at the surface, in their tables
+constexpr double kMostAdded = 4;          // times kMostWrapCells: of needles, and at gaps
+constexpr double kPartsOfCell = 1 << 20;  // of the square of a cell, in which areas are counted
+constexpr uint64_t kBytesOfCell = 700;    // nodes, corners and triangles of a cell at the surface, in their tables
 
 // The tetrahedra of a cell: paths from its lowest node to its highest one, along the axes in every order.
 constexpr std::array<std::array<int, 3>, 6> kPaths = {
@@ -70,11 +71,14 @@ class Wrapper {
       WELLSPACE_RETURN_IF_ERROR(WrapCell(cells_[i]));
     }
     if (out_.triangles.empty()) {
-      return absl::InvalidArgumentError(
-          "triangles: no place has a winding number above 1/2: they bound nothing; expected triangles that surround a "
-          "solid, most of them going one way");
+      return absl::InvalidArgumentError(absl::StrFormat(
+          "triangles: at no node of a grid with cells of %.3g is the winding number above 1/2: they bound nothing, or "
+          "only what is thinner; expected triangles that surround a solid, most of them going one way, or a finer "
+          "resolution",
+          cell_ * unit_));
     }
     WELLSPACE_RETURN_IF_ERROR(DropParts());
+    WELLSPACE_RETURN_IF_ERROR(FindLostArea());
     return std::move(out_);
   }
 
@@ -329,6 +333,49 @@ class Wrapper {
       return absl::OkStatus();
     }
     std::erase_if(out_.triangles, [&](const auto& corners) { return is_small(boxes.at(parts.Find(corners[0]))); });
+    return absl::OkStatus();
+  }
+
+  GridKey CellOf(const Point<3>& p) const { return KeyOf(CellAt(0, p[0]), CellAt(1, p[1]), CellAt(2, p[2])); }
+
+  // Whether one of the cells is the cell or touches it.
+  static bool HasNear(const absl::flat_hash_set<GridKey>& cells, GridKey cell) {
+    for (GridKey z : {cell - kAlong[2], cell, cell + kAlong[2]}) {
+      for (GridKey y : {z - kAlong[1], z, z + kAlong[1]}) {
+        for (GridKey x : {y - kAlong[0], y, y + kAlong[0]}) {
+          if (cells.contains(x)) {
+            return true;
+          }
+        }
+      }
+    }
+    return false;
+  }
+
+  // Adds up the pieces of given triangles which no part of the surface is near, and which are not inside of it.
+  absl::Status FindLostArea() {
+    absl::flat_hash_set<GridKey> cells;  // of the surface
+    for (size_t t = 0; t < out_.triangles.size(); ++t) {
+      WELLSPACE_RETURN_IF_ERROR(CheckAt(t, context_));
+      const auto [a, b, c] = out_.triangles[t];
+      cells.insert(CellOf(MiddleOf({out_.points[a], out_.points[b], out_.points[c]})));
+    }
+    uint64_t parts = 0;  // whole numbers: their sum is the same in any order
+    const auto add = [&](const Triangle& piece, const LongestEdge& longest) -> absl::StatusOr<bool> {
+      if (longest.length_sq > cell_ * cell_) {
+        return true;
+      }
+      const GridKey cell = CellOf(MiddleOf(piece));
+      if (!IsInside(cell) && !HasNear(cells, cell)) {
+        parts += static_cast<uint64_t>(AreaOf(piece) / (cell_ * cell_) * kPartsOfCell);
+      }
+      return false;
+    };
+    for (uint32_t t = 0; t < complex_.triangles.size(); ++t) {
+      WELLSPACE_RETURN_IF_ERROR(CheckAt(t, context_));
+      WELLSPACE_RETURN_IF_ERROR(ForEachPiece(complex_.InOrderAt(t), context_, add));
+    }
+    out_.lost_area = static_cast<double>(parts) / kPartsOfCell * cell_ * cell_;
     return absl::OkStatus();
   }
 

@@ -19,6 +19,7 @@ namespace wellspace::core {
 struct SurfaceWrap {
   std::vector<Point<3>> points;
   std::vector<std::array<uint32_t, 3>> triangles;
+  double lost_area = 0;  // of given triangles that it passes by, though nothing surrounds them
 };
 
 // Of the parts of a wrap those are dropped that are within so many cells along each axis, unless there is no other.
@@ -27,7 +28,8 @@ inline constexpr double kLeastPart = 3;
 // The surface that parts the points with a winding number above 1/2 from the others, on a grid with cells of `cell`: of
 // the negative winding number where the triangles bound a negative volume. Each cell is cut into six tetrahedra, in
 // each of which that surface is a triangle or two. Their corners lie where an edge of a tetrahedron crosses a triangle,
-// a tenth of the edge from its ends at least; at holes, where the number is 1/2. Parts thinner than a cell may be lost.
+// a tenth of the edge from its ends at least; at holes, where the number is 1/2. Parts thinner than a cell may be lost,
+// as are those that go the other way than most: lost_area counts their triangles.
 //
 // The work goes from cells that triangles meet to neighbours, through faces at which both kinds of points are.
 //

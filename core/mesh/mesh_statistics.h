@@ -49,6 +49,7 @@ struct SurfaceStatistics {
   double min_angle_outside_deg = 0;  // the smallest dihedral angle of the other tetrahedra
   double deviation_of_facets = 0;    // the largest distance of samples of facets from the surface
   double deviation_of_surface = 0;   // the largest distance of samples of the surface from facets
+  double lost_area = 0;              // of triangles around parts that solids by winding lose
   std::vector<double> volumes{};     // by region, in the order of Mesh::regions
 };
 

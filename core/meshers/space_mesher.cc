@@ -85,6 +85,7 @@ absl::Status SpaceMesher::Build(const MeshParameters& parameters, const Input& i
   spatial_ = std::move(made.domain);
   meshed_box_ = made.meshed_box;
   const Box<3>& box = made.figures.report.box;
+  keeps_points_ = input.surface->keeps_points;
   default_tolerance_ = DefaultToleranceOf(*input.surface, Distance<3>(box.low, box.high));
   numbering_.Begin(std::move(made.names), input.points, {});
   WELLSPACE_RETURN_IF_ERROR(
@@ -135,7 +136,10 @@ absl::Status SpaceMesher::Explain(absl::Status status) const {
 }
 
 void SpaceMesher::TakeDemands(const MeshParameters& parameters) {
-  const SurfaceCriteria criteria = SurfaceCriteriaOf(parameters, default_tolerance_, frame_.scale);
+  SurfaceCriteria criteria = SurfaceCriteriaOf(parameters, default_tolerance_, frame_.scale);
+  if (keeps_points_ && !parameters.surface.min_facet_angle.has_value()) {
+    criteria.least_sine = 0;  // facets between given points have the angles that they have
+  }
   if (!(criteria == spatial_->criteria())) {
     spatial_->criteria() = criteria;
     refinement_->ForgetRun();
@@ -533,6 +537,7 @@ void SpaceMesher::AddStatistics(const Mesh& mesh, MeshStatistics& statistics, Qu
   surface.lost_ridges = made_->lost_ridges;
   surface.deviation_of_facets = made_->deviation_of_facets / frame_.scale;
   surface.deviation_of_surface = made_->deviation_of_surface / frame_.scale;
+  surface.lost_area = report.lost_area;
   surface.unused_seeds = figures_of_input_.unused_seeds;
   surface.first_unused_seed = figures_of_input_.first_unused_seed;
 }

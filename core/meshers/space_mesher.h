@@ -109,6 +109,7 @@ class SpaceMesher final : public MesherOf<SpaceDomain> {
   SpaceFigures figures_of_input_;
   MeshParameters first_parameters_;  // of the first refinement, by which acute creases have their vertices
   double default_tolerance_ = 0;     // not scaled
+  bool keeps_points_ = false;        // given points on the surface are vertices
   uint32_t meshed_count_ = 0;        // vertices that are handed out
   Workspace<3> workspace_;
   std::optional<MadeOfSolids> made_;  // unless the domain has been refined since

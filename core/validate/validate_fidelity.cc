@@ -425,6 +425,21 @@ class Comparison {
     return absl::OkStatus();
   }
 
+  // Whether points of the complex are among the vertices of facets, as far as welding may have moved them.
+  absl::Status TestVertices(const TriangleTree& vertices, std::span<const uint32_t> points, const char* what) {
+    const double most = surface_.features.weld + Rounding();
+    for (size_t i = 0; i < points.size(); ++i) {
+      WELLSPACE_RETURN_IF_ERROR(Look(i));
+      const Point<3>& p = wanted_.complex.points[points[i]];
+      if (const double distance_sq = vertices.Nearest(p, kNone).distance_sq; distance_sq > most * most) {
+        Fault(absl::StrFormat("%s %s of the surface is no vertex; the nearest is %g away", what, TextOf(p),
+                              std::sqrt(distance_sq)));
+        return absl::OkStatus();
+      }
+    }
+    return absl::OkStatus();
+  }
+
   absl::Status TestCorners() {
     std::vector<Triangle> vertices;
     for (const uint32_t v : facets()) {
@@ -432,18 +447,15 @@ class Comparison {
     }
     TriangleTree tree;
     WELLSPACE_RETURN_IF_ERROR(tree.Build(std::move(vertices), context_));
-    for (size_t i = 0; i < wanted_.corners.size(); ++i) {
-      WELLSPACE_RETURN_IF_ERROR(Look(i));
-      const Point<3>& corner = wanted_.complex.points[wanted_.corners[i]];
-      // As far as welding may have moved it.
-      const double most = surface_.features.weld + Rounding();
-      if (const double distance_sq = tree.Nearest(corner, kNone).distance_sq; distance_sq > most * most) {
-        Fault(absl::StrFormat("the corner %s of the surface is no vertex; the nearest is %g away", TextOf(corner),
-                              std::sqrt(distance_sq)));
-        return absl::OkStatus();
-      }
+    WELLSPACE_RETURN_IF_ERROR(TestVertices(tree, wanted_.corners, "the corner"));
+    if (!surface_.features.keeps_points) {
+      return absl::OkStatus();
     }
-    return absl::OkStatus();
+    std::vector<uint32_t> kept;
+    for (const uint32_t t : wanted_.bounding) {
+      kept.insert(kept.end(), wanted_.complex.triangles[t].begin(), wanted_.complex.triangles[t].end());
+    }
+    return TestVertices(tree, kept, "the point");
   }
 
   const MeshView& mesh_;

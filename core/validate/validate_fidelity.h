@@ -62,7 +62,7 @@ struct FidelityReport {
 // 5. An edge with another number of facets than two lies within the tolerance of an edge with another number of
 //    triangles than two.
 // 6. Along all curves run edges where facets make an angle, have several tags, or are not two: the ridges, if they are
-//    known; and corners of curves are vertices.
+//    known; and corners of curves are vertices, with `keeps_points` those of all triangles around meshed solids.
 //
 // Triangles of the surface are made clean, and their solids and curves are found by the code that a mesher prepares
 // them with, which is the reference. The mesh itself is measured without it: distances by a tree of boxes, insides

@@ -68,6 +68,7 @@ core::SurfaceFeatures RulesFromProto(const v1::SurfaceOptions& options) {
   rules.weld = options.weld();
   rules.min_patch = options.min_patch();
   rules.resolution = options.resolution();
+  rules.keeps_points = options.keep_points();
   return rules;
 }
 
@@ -84,6 +85,7 @@ v1::SurfaceOptions RulesToProto(const core::SurfaceFeatures& rules) {
   if (rules.resolution > 0) {
     options.set_resolution(rules.resolution);
   }
+  options.set_keep_points(rules.keeps_points);
   return options;
 }
 
@@ -183,7 +185,8 @@ uint64_t SpaceFeatures::CountEqual(uint64_t first, uint64_t count, const v1::Sur
 bool SpaceFeatures::HasOtherRules(const v1::SurfaceOptions& options) const {
   const core::SurfaceFeatures rules = RulesFromProto(options);
   return IsEmpty() || rules.solids != rules_.solids || rules.crease_angle != rules_.crease_angle ||
-         rules.weld != rules_.weld || rules.min_patch != rules_.min_patch || rules.resolution != rules_.resolution;
+         rules.weld != rules_.weld || rules.min_patch != rules_.min_patch || rules.resolution != rules_.resolution ||
+         rules.keeps_points != rules_.keeps_points;
 }
 
 FeatureSummary SpaceFeatures::Summary() const {

@@ -141,6 +141,7 @@ void SetSurface(const core::SurfaceStatistics& surface, v1::SurfaceStatistics& m
   message.set_min_facet_angle_deg(surface.min_facet_angle_deg);
   message.set_deviation_of_facets(surface.deviation_of_facets);
   message.set_deviation_of_surface(surface.deviation_of_surface);
+  message.set_lost_area(surface.lost_area);
   message.mutable_volumes()->Assign(surface.volumes.begin(), surface.volumes.end());
 }
 

@@ -131,7 +131,8 @@ absl::Status FromCore(const absl::Status& status) {
                                         {"crease_angle:", "surface.crease_angle"},
                                         {"weld:", "surface.weld"},
                                         {"min_patch:", "surface.min_patch"},
-                                        {"resolution:", "surface.resolution"}}) {
+                                        {"resolution:", "surface.resolution"},
+                                        {"keep_points:", "surface.keep_points"}}) {
         if (message.rfind(what, 0) == 0) {
           return MakeError(v1::ERROR_REASON_INVALID_TRIANGLES, message, field);
         }

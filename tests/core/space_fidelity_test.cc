@@ -35,40 +35,54 @@ double DiagonalOf(const TestSurface& surface) {
   return std::sqrt(sum_sq);
 }
 
-// Meshes the inside of `surface`, with edges of facets of that share of the diagonal, and holds the mesh to it. Returns
-// the volume that its tetrahedra have.
-double ExpectFaithful(const TestSurface& surface, SolidRule rule, double edge) {
+// With edges of facets of that share of the diagonal.
+absl::StatusOr<Mesh> MeshOf(const TestSurface& surface, const SurfaceFeatures& features, double edge) {
   const double diagonal = DiagonalOf(surface);
-  SurfaceFeatures features = surface.Features();
-  features.solids = rule;
   MeshParameters parameters;
   parameters.min_dihedral = 0;
   parameters.max_vertices = 20000;
   parameters.surface.edge_length = edge * diagonal;
   parameters.surface.tolerance = kTolerance * diagonal;
   RunContext context;
-  const absl::StatusOr<Mesh> mesh = MeshPoints(parameters, Input(surface.points, features), context);
+  return MeshPoints(parameters, Input(surface.points, features), context);
+}
+
+// A mesh as the checks see it.
+struct CheckedMesh {
+  explicit CheckedMesh(const Mesh& mesh) : view{.dimension = 3, .points = mesh.points, .simplices = mesh.simplices} {
+    for (const BoundaryPart& part : mesh.boundary) {
+      tags.insert(tags.end(), part.facets, part.tag);
+    }
+    parts.domain.boundary = {.facets = mesh.facets, .tags = tags};
+    parts.domain.regions = mesh.simplex_regions;
+    parts.ridges = mesh.ridges;
+  }
+  absl::StatusOr<FidelityReport> ComparedWith(const TestSurface& surface, const SurfaceFeatures& features) const {
+    return CompareWithSurface(view, parts, {.points = surface.points, .features = features},
+                              {.tolerance = 1.25 * kTolerance * DiagonalOf(surface)}, RunContext());
+  }
+
+  MeshView view;
+  std::vector<int32_t> tags;
+  SolidParts parts;
+};
+
+// Meshes the inside of `surface`, and holds the mesh to it. Returns the volume that its tetrahedra have.
+double ExpectFaithful(const TestSurface& surface, SolidRule rule, double edge) {
+  SurfaceFeatures features = surface.Features();
+  features.solids = rule;
+  const absl::StatusOr<Mesh> mesh = MeshOf(surface, features, edge);
   EXPECT_TRUE(mesh.ok()) << mesh.status();
   if (!mesh.ok()) {
     return 0;
   }
-  std::vector<int32_t> tags;
-  for (const BoundaryPart& part : mesh->boundary) {
-    tags.insert(tags.end(), part.facets, part.tag);
-  }
-  SolidParts parts;
-  parts.domain.boundary = {.facets = mesh->facets, .tags = tags};
-  parts.domain.regions = mesh->simplex_regions;
-  parts.ridges = mesh->ridges;
-  const MeshView view = {.dimension = 3, .points = mesh->points, .simplices = mesh->simplices};
-  const absl::StatusOr<SolidMeshReport> alone = ValidateSolidMesh(view, parts, 2, RunContext());
+  const CheckedMesh checked(*mesh);
+  const absl::StatusOr<SolidMeshReport> alone = ValidateSolidMesh(checked.view, checked.parts, 2, RunContext());
   EXPECT_TRUE(alone.ok()) << alone.status();
   if (!alone.ok()) {
     return 0;
   }
-  const absl::StatusOr<FidelityReport> report =
-      CompareWithSurface(view, parts, {.points = surface.points, .features = features},
-                         {.tolerance = 1.25 * kTolerance * diagonal}, RunContext());
+  const absl::StatusOr<FidelityReport> report = checked.ComparedWith(surface, features);
   EXPECT_TRUE(report.ok()) << report.status();
   if (report.ok()) {
     EXPECT_TRUE(report->verdict.ok()) << report->verdict;
@@ -158,6 +172,24 @@ TEST_F(SpaceFidelityTest, SpheresInSpheres) {
   const double shell = ExpectFaithful(spheres, SolidRule::kEvenOdd, 0.15);
   const double whole = ExpectFaithful(spheres, SolidRule::kHoles, 0.15);
   EXPECT_NEAR(whole - shell, 0.125 * whole, 0.01 * whole);
+}
+
+// A mesh without the points of its surface is as faithful, but not one that keeps them.
+TEST_F(SpaceFidelityTest, KeptPointsAreVertices) {
+  const TestSurface sphere = test::Sphere(2);
+  SurfaceFeatures features = sphere.Features();
+  for (const bool keeps_points : {true, false}) {
+    features.keeps_points = keeps_points;
+    const absl::StatusOr<Mesh> mesh = MeshOf(sphere, features, 0.3);
+    ASSERT_TRUE(mesh.ok()) << mesh.status();
+    features.keeps_points = true;
+    const absl::StatusOr<FidelityReport> report = CheckedMesh(*mesh).ComparedWith(sphere, features);
+    ASSERT_TRUE(report.ok()) << report.status();
+    EXPECT_EQ(report->verdict.ok(), keeps_points) << report->verdict;
+    if (!keeps_points) {
+      EXPECT_NE(report->verdict.message().find("of the surface is no vertex"), std::string::npos) << report->verdict;
+    }
+  }
 }
 
 TEST_F(SpaceFidelityTest, AcuteParts) {

@@ -4,7 +4,8 @@
 // Input: a character that chooses among kFormats, '0' the first, '1' the second and so on, and then the file; with a
 // .node file beside it that file first, after a length of two bytes, low one first. After 'x' comes a complex: a byte
 // each for the solids, the weld and the number of points; a byte for each coordinate; then three bytes for the corners
-// of each triangle and one for its marker.
+// of each triangle and one for its marker. After 'w' comes one whose solids are by winding: with a byte for the
+// resolution, and none for the solids.
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -62,6 +63,7 @@ void RequireReport(const core::SurfaceReport& report, uint64_t given) {
   Require(report.patches > 0 && report.patches <= report.triangles, "every patch has a triangle");
   Require(2 * report.flipped_triangles <= report.triangles, "at most half are flipped");
   Require(report.volume.has_value() == report.faults.empty(), "a volume is told where nothing is wrong");
+  Require(report.lost_area >= 0 && std::isfinite(report.lost_area), "an area is lost, or none");
   for (const core::SurfaceFault& fault : report.faults) {
     Require(fault.count > 0 && !fault.places.empty() && !fault.accepted.empty(), "a fault has a count and a place");
     for (const core::FaultPlace& place : fault.places) {
@@ -99,7 +101,7 @@ void RequireSameBackwards(const std::vector<double>& points, core::SurfaceFeatur
   Require(again.ok(), "the order of triangles is no error:", again.status().ToString());
   const auto figures = [](const core::SurfaceReport& r) {
     return std::tuple(r.triangles, r.area, r.volume, r.solids, r.curves, r.corners, r.patches, r.sharpest_angle_deg,
-                      r.sharpest_at, r.flipped_triangles, r.components, r.membranes, r.faults.size());
+                      r.sharpest_at, r.flipped_triangles, r.components, r.membranes, r.faults.size(), r.lost_area);
   };
   Require(figures(*again) == figures(report), "the order of triangles changes nothing");
 }
@@ -112,12 +114,18 @@ void Inspect(const std::vector<double>& points, const core::SurfaceFeatures& fea
     return;
   }
   RequireReport(*report, features.triangle_count());
+  Require(features.solids != core::SolidRule::kWinding || report->faults.empty(), "a wrap has no faults");
   RequireSameBackwards(points, features, *report);
 }
 
-void TryComplex(ByteReader& bytes) {
+void TryComplex(ByteReader& bytes, bool winds) {
   core::SurfaceFeatures features;
-  features.solids = bytes.Next() % 2 == 0 ? core::SolidRule::kEvenOdd : core::SolidRule::kHoles;
+  if (winds) {
+    features.solids = core::SolidRule::kWinding;
+    features.resolution = 0.25 * (1 + bytes.Next() % 5);
+  } else {
+    features.solids = bytes.Next() % 2 == 0 ? core::SolidRule::kEvenOdd : core::SolidRule::kHoles;
+  }
   features.weld = bytes.Next() % 3 == 0 ? 1.0 : 0.0;
   const size_t count = 3 + bytes.Next() % kMostPoints;
   std::vector<double> points;
@@ -144,8 +152,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace wellspace;
   fuzz::ByteReader bytes(data, size);
   const uint8_t choice = bytes.Next();
-  if (choice == 'x') {
-    fuzz::TryComplex(bytes);
+  if (choice == 'x' || choice == 'w') {
+    fuzz::TryComplex(bytes, choice == 'w');
     return 0;
   }
   const size_t format = static_cast<uint8_t>(choice - '0') % fuzz::kFormats.size();

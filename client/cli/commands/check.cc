@@ -365,7 +365,8 @@ absl::Status CheckCommand::CheckOptionsOfDomain() const {
         "--criterion well-spaced: a domain with segments or triangles has the radius-edge one alone");
   }
   if (!cloud_path.empty() && surface.IsAsked()) {
-    return absl::InvalidArgumentError("--cloud: the points of a surface need not be vertices; leave it out");
+    return absl::InvalidArgumentError(
+        "--cloud: the points of a surface need not be vertices; give --keep-points where they are to be");
   }
   if (!cloud_path.empty() && !IsCloudADomain()) {
     return absl::InvalidArgumentError(absl::StrCat(

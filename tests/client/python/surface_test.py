@@ -81,6 +81,12 @@ class SurfaceTest(Case):
             with self.fails(InvalidArgumentError, message):
                 wellspace.mesh(points, triangles=triangles, **given)
 
+    def test_points_of_the_surface_are_kept(self):
+        mesh = wellspace.mesh(CORNERS, triangles=CUBE, facet_length=0.3, keep_points=True)
+        np.testing.assert_array_equal(mesh.points[mesh.input_vertices], CORNERS)
+        with self.fails(InvalidArgumentError, "keep_points"):
+            wellspace.mesh(CORNERS, triangles=CUBE, solids="winding", keep_points=True)
+
     def test_wrong_input(self):
         for given, message, field in (
             ({"triangles": [[0, 1, 8]]}, "below 8", "triangles[0]"),

@@ -41,6 +41,16 @@ absl::StatusOr<Mesh> Wrapped(const test::TestSurface& surface, double resolution
   return MeshPoints(parameters, Input(surface.points, features), context);
 }
 
+// The material of each box of a grid.
+int OfOne(int /*x*/, int /*y*/, int /*z*/) { return 1; }
+
+test::TestSurface Inverted(test::TestSurface surface) {
+  for (size_t t = 0; t < surface.triangle_count(); ++t) {
+    std::swap(surface.corners[3 * t], surface.corners[3 * t + 1]);
+  }
+  return surface;
+}
+
 class WindingMeshesTest : public test::SeededTest {
  protected:
   WindingMeshesTest() : SeededTest(20261130) {}
@@ -99,12 +109,9 @@ TEST_F(WindingMeshesTest, SoupsAreClosed) {
 }
 
 TEST_F(WindingMeshesTest, InvertedTrianglesAreTheSame) {
-  test::TestSurface sphere = test::Sphere(3);
+  const test::TestSurface sphere = test::Sphere(3);
   const absl::StatusOr<Mesh> mesh = Wrapped(sphere, 0.08, Parameters(0.05));
-  for (size_t t = 0; t < sphere.triangle_count(); ++t) {
-    std::swap(sphere.corners[3 * t], sphere.corners[3 * t + 1]);
-  }
-  const absl::StatusOr<Mesh> inverted = Wrapped(sphere, 0.08, Parameters(0.05));
+  const absl::StatusOr<Mesh> inverted = Wrapped(Inverted(sphere), 0.08, Parameters(0.05));
   ASSERT_TRUE(mesh.ok() && inverted.ok()) << mesh.status() << inverted.status();
   EXPECT_NEAR(VolumeOf(*inverted), VolumeOf(*mesh), 1e-3);
 }
@@ -122,10 +129,7 @@ TEST_F(WindingMeshesTest, OverlapsAreUnited) {
 }
 
 TEST_F(WindingMeshesTest, ACavityStaysOne) {
-  test::TestSurface inner = test::Sphere(3, {0, 0, 0}, 0.5);
-  for (size_t t = 0; t < inner.triangle_count(); ++t) {
-    std::swap(inner.corners[3 * t], inner.corners[3 * t + 1]);
-  }
+  const test::TestSurface inner = Inverted(test::Sphere(3, {0, 0, 0}, 0.5));
   const absl::StatusOr<Mesh> mesh = Wrapped(test::Joined(test::Sphere(4), inner), 0.05, Parameters(0.02));
   ASSERT_TRUE(mesh.ok()) << mesh.status();
   ExpectConforming(*mesh);
@@ -157,6 +161,46 @@ TEST_F(WindingMeshesTest, WhatSurroundsNothingIsRefused) {
   test::TestSurface sheet;
   sheet.AddPolygon({{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}});
   EXPECT_THAT(std::string(Wrapped(sheet, 0.05, Parameters(0.05)).status().message()), HasSubstr("they bound nothing"));
+}
+
+absl::StatusOr<SurfaceReport> Inspected(const test::TestSurface& surface, double resolution) {
+  SurfaceFeatures features = surface.Features();
+  features.solids = SolidRule::kWinding;
+  features.resolution = resolution;
+  return InspectSurface(surface.points, features, 1, RunContext());
+}
+
+double LostAreaOf(const test::TestSurface& surface) {
+  const absl::StatusOr<SurfaceReport> report = Inspected(surface, 0.08);
+  EXPECT_TRUE(report.ok()) << report.status();
+  return report.ok() ? report->lost_area : -1;
+}
+
+TEST_F(WindingMeshesTest, LostPartsAreTold) {
+  const test::TestSurface sphere = test::Sphere(3);
+  EXPECT_EQ(LostAreaOf(sphere), 0);
+  EXPECT_EQ(LostAreaOf(test::Joined(sphere, test::Sphere(3, {1, 0, 0}))), 0) << "of walls in an overlap";
+  EXPECT_EQ(LostAreaOf(test::Joined(sphere, Inverted(test::Sphere(3, {0, 0, 0}, 0.5)))), 0) << "of a cavity";
+
+  const test::TestSurface plate = test::Boxes({2, 3}, {-0.5, 0.5}, {0.0, 0.004}, OfOne);
+  const double area = 2 + 4 * 0.004;
+  EXPECT_NEAR(LostAreaOf(test::Joined(sphere, plate)), area, 0.01 * area);
+  const absl::StatusOr<Mesh> mesh = Wrapped(test::Joined(sphere, plate), 0.08, Parameters(0.08));
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  EXPECT_NEAR(mesh->statistics.surface->lost_area, area, 0.01 * area);
+
+  const double turned = LostAreaOf(test::Joined(sphere, Inverted(test::Sphere(3, {3, 0, 0}, 0.5))));
+  EXPECT_NEAR(turned, std::numbers::pi, 0.02 * std::numbers::pi);
+}
+
+TEST_F(WindingMeshesTest, LostAreaIsTheSameInAnyOrder) {
+  const test::TestSurface parts = test::Joined(test::Sphere(3), Inverted(test::Sphere(3, {3, 0, 0}, 0.5)));
+  EXPECT_EQ(LostAreaOf(test::Shuffled(parts, random_)), LostAreaOf(parts));
+}
+
+TEST_F(WindingMeshesTest, APlateThinnerThanACellAsksForAFinerResolution) {
+  const test::TestSurface plate = test::Boxes({0, 1}, {0, 1}, {0.0, 0.004}, OfOne);
+  EXPECT_THAT(std::string(Wrapped(plate, 0.1, Parameters(0.05)).status().message()), HasSubstr("a finer resolution"));
 }
 
 TEST_F(WindingMeshesTest, ResolutionsOfAllExponentsEnd) {
@@ -208,9 +252,7 @@ TEST_F(WindingMeshesTest, ResolutionAndCurvatureAreNotForOthers) {
 
 TEST_F(WindingMeshesTest, AReportHasNoFaults) {
   const test::TestSurface soup = Broken(test::Sphere(3), 0.03, 0.03, 0.01, 0.002);
-  SurfaceFeatures features = soup.Features();
-  features.solids = SolidRule::kWinding;
-  const absl::StatusOr<SurfaceReport> report = InspectSurface(soup.points, features, 1, RunContext());
+  const absl::StatusOr<SurfaceReport> report = Inspected(soup, 0.04);
   ASSERT_TRUE(report.ok()) << report.status();
   EXPECT_TRUE(report->faults.empty());
   ASSERT_TRUE(report->volume.has_value());

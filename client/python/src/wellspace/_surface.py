@@ -57,6 +57,7 @@ class Surface:
     regions: tuple[SolidSeed, ...]
     solids: int
     numbers: dict[str, float]  # crease_angle, weld and such, as far as they are given
+    keep_points: bool
 
     request_fields = (7, 8)
     method = "AddTriangles"
@@ -85,7 +86,9 @@ class Surface:
             bound = {} if math.isinf(r.max_volume) else {"max_volume": r.max_volume}
             seeds.append(seed(x=r.x, y=r.y, z=r.z, region=r.region, **bound))
         for first in range(0, max(1, len(seeds)), SEEDS_OF_A_REQUEST):
-            options = _api.message("SurfaceOptions")(solids=self.solids, **self.numbers)
+            options = _api.message("SurfaceOptions")(
+                solids=self.solids, keep_points=self.keep_points, **self.numbers
+            )
             options.seeds.extend(seeds[first : first + SEEDS_OF_A_REQUEST])
             yield first, options.SerializeToString()
 
@@ -94,8 +97,8 @@ class TriangleArguments(TypedDict, total=False):
     """
     triangles : (m, 3) int
         In 3-D: numbers of points. Their solids are meshed, and the mesh meets them within `tolerance`; their corners
-        are no vertices. The orientation of a triangle means nothing, but with ``solids="winding"``. See
-        `wellspace.read_surface`. Default: none.
+        are no vertices, unless `keep_points` says so. The orientation of a triangle means nothing, but with
+        ``solids="winding"``. See `wellspace.read_surface`. Default: none.
     solids : {"even-odd", "holes", "winding"}
         Which solids, into which triangles cut space, are meshed: those that an odd number of triangles separates from
         infinity; all bounded ones, as of several materials; or the places that triangles go around, which need not
@@ -112,6 +115,9 @@ class TriangleArguments(TypedDict, total=False):
     resolution : float
         With ``solids="winding"``: the side of the cells in which what is meshed is looked for. In the unit of the
         points, at most 10 % of the diagonal. Default: 0.5 % of it.
+    keep_points : bool
+        Whether corners of triangles are vertices, with their numbers in `input_vertices`, as points inside are. For
+        surfaces that are good meshes: long triangles take far more vertices then. Default: false.
     """
 
     triangles: Any
@@ -120,6 +126,7 @@ class TriangleArguments(TypedDict, total=False):
     weld: float
     min_patch: float
     resolution: float
+    keep_points: bool
 
 
 class SurfaceArguments(DomainArguments, TriangleArguments, total=False):
@@ -143,6 +150,7 @@ def make_surface(given: Mapping[str, Any], point_count: int | None = None) -> Su
         regions=tuple(_seed(one, f"regions[{row}]") for row, one in enumerate(given.get("regions", ()))),
         solids=choice(given.get("solids", "even-odd"), "solids", _SOLIDS),
         numbers=numbers,
+        keep_points=bool(given.get("keep_points", False)),
     )
 
 

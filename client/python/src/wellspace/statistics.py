@@ -116,6 +116,7 @@ class SurfaceStatistics:
     min_facet_angle_deg: float
     deviation_of_facets: float
     deviation_of_surface: float
+    lost_area: float
     volumes: tuple[float, ...]
 
 
