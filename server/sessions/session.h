@@ -294,6 +294,10 @@ class Session {
 
   // Errors:     OPERATION_NOT_FOUND.
   absl::StatusOr<std::shared_ptr<Operation>> FindOperation(const std::string& operation_name) const;
+  // An operation of this session as it is told to clients.
+  //
+  // Errors:     SESSION_ELSEWHERE: it goes on there, whatever became of it here.
+  absl::StatusOr<v1::Operation> Tell(const Operation& operation) const;
   // The operations after number `after`, the oldest first, at most `count`.
   std::vector<std::shared_ptr<Operation>> ListOperations(uint64_t after, size_t count) const;
 

@@ -248,6 +248,12 @@ absl::StatusOr<std::shared_ptr<Job>> Session::Cancel(Operation& operation) {
   return job;
 }
 
+absl::StatusOr<v1::Operation> Session::Tell(const Operation& operation) const {
+  v1::Operation told = operation.Describe();
+  // After that: an operation fails here only after its session is known to be elsewhere.
+  return IsElsewhere() ? Elsewhere(name()) : absl::StatusOr<v1::Operation>(std::move(told));
+}
+
 absl::StatusOr<std::shared_ptr<Operation>> Session::FindOperation(const std::string& operation_name) const {
   absl::MutexLock lock(&mutex_);
   const auto found = std::find_if(operations_.begin(), operations_.end(), [&](const std::shared_ptr<Operation>& kept) {

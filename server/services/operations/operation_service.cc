@@ -34,7 +34,7 @@ absl::Status Start(const CallEnvironment& environment, const Caller& caller, con
 absl::Status Get(const CallEnvironment& environment, const Caller& caller, const v1::GetOperationRequest& request,
                  v1::Operation* operation) {
   WELLSPACE_ASSIGN_OR_RETURN(const FoundOperation found, FindOperation(environment, caller, request.name()));
-  *operation = found.operation->Describe();
+  WELLSPACE_ASSIGN_OR_RETURN(*operation, found.session->Tell(*found.operation));
   return absl::OkStatus();
 }
 
@@ -42,7 +42,7 @@ absl::Status Cancel(const CallEnvironment& environment, const Caller& caller, co
                     v1::Operation* cancelled) {
   WELLSPACE_ASSIGN_OR_RETURN(const FoundOperation found, FindOperation(environment, caller, request.name()));
   WELLSPACE_RETURN_IF_ERROR(CancelOperation(environment, *found.session, *found.operation));
-  *cancelled = found.operation->Describe();
+  WELLSPACE_ASSIGN_OR_RETURN(*cancelled, found.session->Tell(*found.operation));
   return absl::OkStatus();
 }
 
@@ -58,7 +58,7 @@ absl::Status List(const CallEnvironment& environment, const Caller& caller, cons
   if (listed < operations.size()) {
     response.set_next_page_token(MakePageToken(list, operations[listed - 1]->number()));
   }
-  return absl::OkStatus();
+  return session->IsElsewhere() ? Elsewhere(session->name()) : absl::OkStatus();
 }
 
 }  // namespace

@@ -41,7 +41,12 @@ std::optional<v1::WatchOperationResponse> WatchOperationCall::NextResponse() {
     after_ = event->sequence();
     *response.mutable_progress() = *std::move(event);
   } else if (has_ended) {
-    *response.mutable_operation() = operation_->Describe();
+    absl::StatusOr<v1::Operation> told = use_->session().Tell(*operation_);
+    if (!told.ok()) {
+      End(std::move(told).status());
+      return std::nullopt;
+    }
+    *response.mutable_operation() = *std::move(told);
     is_end_sent_ = true;
   } else {
     return std::nullopt;
