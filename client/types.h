@@ -60,6 +60,15 @@ struct FaceSeed {
   uint64_t segment_count = 0;
 };
 
+// Names of parts of a mesh, in the place of the default ones; see the proto's PartNames.
+struct PartNames {
+  std::map<int32_t, std::string> markers;  // of parts of the boundary, by marker
+  std::map<int32_t, std::string> regions;  // by the region of seeds
+
+  bool IsEmpty() const { return markers.empty() && regions.empty(); }
+  bool operator==(const PartNames&) const = default;
+};
+
 // Segments between points in 2-D, and the faces that they bound; see the proto's SegmentChunk and FaceOptions.
 struct Features {
   std::vector<uint32_t> ends;    // m x 2, row-major: indices of points
@@ -70,6 +79,7 @@ struct Features {
   FaceRule faces = FaceRule::kBox;
   CrossingRule crossings = CrossingRule::kRefuse;
   std::optional<double> snap_distance{};  // of kSnap and kSplit; none: distances that doubles cannot resolve
+  PartNames names;
 };
 
 // The solids, into which triangles cut space, that are meshed; see the proto's SolidRule.
@@ -96,6 +106,7 @@ struct SurfaceFeatures {
   std::optional<double> min_patch{};
   std::optional<double> resolution{};  // of kWinding
   bool keeps_points = false;
+  PartNames names;
 };
 
 // The fidelity of a mesh to its surface; see the proto's SurfaceParameters.
@@ -351,6 +362,7 @@ struct Session {
   uint64_t triangle_count = 0;
   std::optional<SurfaceFeatures>
       surface{};              // without triangles and seeds; none: there are neither triangles nor options
+  PartNames names;            // of parts of its mesh
   uint64_t size_count = 0;    // samples of sizes, see SetSizes
   uint64_t stored_bytes = 0;  // of its points, features, sizes and mesh
 };

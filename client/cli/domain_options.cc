@@ -110,6 +110,9 @@ absl::StatusOr<formats::PointCloud> DomainOptions::Read(const std::string& path,
   if (snap_.has_value() && snap_->value > 0) {
     features.snap_distance = snap_->Of(domain.points, 2);
   }
+  AddPartNames(domain.marker_names, features.names.markers);
+  AddPartNames(domain.region_names, features.names.regions);
+  features.names = Joined(std::move(features.names), names_);
   features_ = std::make_shared<const client::Features>(std::move(features));
   formats::PointCloud cloud;
   cloud.name = domain.name;

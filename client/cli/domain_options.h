@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -57,6 +58,8 @@ class DomainOptions {
 
   // The domain that has been read; null before.
   const std::shared_ptr<const client::Features>& features() const { return features_; }
+  // Names of parts. To be called before Read.
+  void SetNames(client::PartNames names) { names_ = std::move(names); }
 
   // The part that the server has before the one that was read.
   struct Before {
@@ -76,6 +79,7 @@ class DomainOptions {
   std::string faces_;
   bool splits_crossings_ = false;
   std::optional<Length> snap_;
+  client::PartNames names_;
   formats::DomainOptions reading_;
   std::optional<formats::PlanarDomain> domain_;
   std::shared_ptr<const client::Features> features_;

@@ -69,12 +69,16 @@ void MeshingOptions::AddTo(CLI::App& command) {
   AddCloudOptions(command, cloud_options_, "IN", InputFormats());
   domain_.AddTo(command);
   surface_.AddMeshingTo(command, "IN");
+  part_names_.AddTo(command);
   size_field_.AddTo(command);
 }
 
 bool MeshingOptions::has_figures_on_stdout() const { return statistics_ == formats::kStandardStream || remote_.json(); }
 
-absl::Status MeshingOptions::Check() const { return parameters_.Check(); }
+absl::Status MeshingOptions::Check() const {
+  WELLSPACE_RETURN_IF_ERROR(part_names_.Check());
+  return parameters_.Check();
+}
 
 void MeshingOptions::AddFilesTo(formats::FilePlan& files) const {
   files.Reads("IN", input_);
@@ -89,6 +93,8 @@ void MeshingOptions::AddFilesTo(formats::FilePlan& files) const {
 
 absl::StatusOr<formats::PointCloud> MeshingOptions::Read() {
   const bool is_surface = surface_.IsSurface(input_, cloud_options_, SurfaceOptions::Poly::kByPath);
+  surface_.SetNames(part_names_.names());
+  domain_.SetNames(part_names_.names());
   if (is_surface) {
     WELLSPACE_RETURN_IF_ERROR(domain_.CheckOther("IN has triangles, which bound solids; give a file of segments"));
     return surface_.ReadInput(input_, cloud_options_);
@@ -102,6 +108,10 @@ absl::StatusOr<formats::PointCloud> MeshingOptions::Read() {
     return domain_.Read(input_, cloud_options_);
   }
   WELLSPACE_RETURN_IF_ERROR(domain_.CheckCloud());
+  if (const char* const option = part_names_.given(); option != nullptr) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(option, ": IN has points alone, and no markers; give a domain or a surface"));
+  }
   cloud_options_.dimension = dimension();
   return formats::ReadCloud(input_, cloud_options_);
 }

@@ -15,6 +15,7 @@
 #include "client/cli/domain_options.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/parameter_options.h"
+#include "client/cli/part_name_options.h"
 #include "client/cli/remote_command.h"
 #include "client/cli/size_field_options.h"
 #include "client/cli/surface_options.h"
@@ -97,6 +98,7 @@ class MeshingOptions {
   CloudReport report_;  // of the cloud, once it is read
   std::string statistics_;
   ParameterOptions parameters_;
+  PartNameOptions part_names_;
   RemoteCommand remote_;
 };
 

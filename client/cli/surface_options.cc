@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "client/cli/part_name_options.h"
 #include "client/cli/remote_command.h"
 #include "client/error_details.h"
 #include "client/files/region_numbers.h"
@@ -178,6 +179,8 @@ absl::StatusOr<formats::PointCloud> SurfaceOptions::ReadInput(const std::string&
   features.crease_angle = rules.crease_angle;
   features.weld = rules.weld;
   features.keeps_points = rules.keeps_points;
+  AddPartNames(PartNames(), features.names.markers);
+  features.names = Joined(std::move(features.names), names_);
   features_ = std::make_shared<const client::SurfaceFeatures>(std::move(features));
   formats::PointCloud cloud;
   cloud.name = surface_->name;

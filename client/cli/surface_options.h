@@ -71,6 +71,8 @@ class SurfaceOptions {
   // Errors:     those of Read, and of formats::ReadSolidSeeds.
   absl::StatusOr<formats::PointCloud> ReadInput(const std::string& path, const formats::CloudOptions& options);
 
+  // Names of parts, over those of the file. To be called before ReadInput.
+  void SetNames(client::PartNames names) { names_ = std::move(names); }
   // The surface that ReadInput has read; null before.
   const std::shared_ptr<const client::SurfaceFeatures>& features() const { return features_; }
   // The names of parts of the boundary, by the markers of the triangles that ReadInput has read.
@@ -101,6 +103,7 @@ class SurfaceOptions {
   std::optional<Length> weld_;
   std::optional<Length> resolution_;
   bool keeps_points_ = false;
+  client::PartNames names_;
   std::string seeds_path_;
   std::string path_;
   std::optional<formats::Surface> surface_;

@@ -50,6 +50,11 @@ SessionState StateFromProto(v1::Session::State state) {
   }
 }
 
+PartNames NamesFromProto(const v1::PartNames& message) {
+  return {.markers = {message.markers().begin(), message.markers().end()},
+          .regions = {message.regions().begin(), message.regions().end()}};
+}
+
 // Without triangles and seeds.
 SurfaceFeatures SurfaceFromProto(const v1::SurfaceOptions& message) {
   const auto get = [](bool is_given, double value) { return is_given ? std::optional(value) : std::nullopt; };
@@ -399,6 +404,7 @@ absl::StatusOr<Session> SessionFromProto(const v1::Session& message) {
                  .snap_distance = message.has_snap_distance() ? std::optional(message.snap_distance()) : std::nullopt,
                  .triangle_count = message.triangle_count(),
                  .surface = message.has_surface() ? std::optional(SurfaceFromProto(message.surface())) : std::nullopt,
+                 .names = NamesFromProto(message.names()),
                  .size_count = message.size_count(),
                  .stored_bytes = message.stored_bytes()};
 }

@@ -35,6 +35,11 @@ std::optional<Rule> FromProto(const std::pair<Rule, Message> (&table)[N], Messag
   return row == std::end(table) ? std::nullopt : std::optional(row->first);
 }
 
+void FillNames(const PartNames& names, v1::PartNames& message) {
+  message.mutable_markers()->insert(names.markers.begin(), names.markers.end());
+  message.mutable_regions()->insert(names.regions.begin(), names.regions.end());
+}
+
 }  // namespace
 
 std::optional<FaceRule> FaceRuleFromProto(v1::FaceRule rule) { return FromProto(kFaceRules, rule); }
@@ -66,6 +71,9 @@ size_t FillFaces(const Features& features, size_t first, v1::FaceOptions& option
   options.Clear();
   options.set_faces(ToProto(kFaceRules, features.faces));
   options.set_crossings(ToProto(kCrossingRules, features.crossings));
+  if (first == 0 && !features.names.IsEmpty()) {
+    FillNames(features.names, *options.mutable_names());
+  }
   if (features.snap_distance.has_value()) {
     options.set_snap_distance(*features.snap_distance);
   }
@@ -118,6 +126,9 @@ size_t FillSurface(const SurfaceFeatures& surface, size_t first, v1::SurfaceOpti
   set(surface.min_patch, &v1::SurfaceOptions::set_min_patch);
   set(surface.resolution, &v1::SurfaceOptions::set_resolution);
   options.set_keep_points(surface.keeps_points);
+  if (first == 0 && !surface.names.IsEmpty()) {
+    FillNames(surface.names, *options.mutable_names());
+  }
   for (; first < end; ++first) {
     const SolidSeed& seed = surface.seeds[first];
     v1::SolidSeed& message = *options.add_seeds();

@@ -6,6 +6,7 @@
 #include <limits>
 #include <span>
 
+#include "core/features/part_names.h"
 #include "core/geometry/point.h"
 
 namespace wellspace::core {
@@ -53,7 +54,8 @@ struct Features {
   std::span<const FaceSeed> seeds;
   FaceRule faces = FaceRule::kBox;
   CrossingRule crossings = CrossingRule::kRefuse;
-  double snap_distance = 0;  // of the points' unit; none where kRefuse
+  double snap_distance = 0;          // of the points' unit; none where kRefuse
+  const PartNames* names = nullptr;  // null: the default ones
 
   size_t segment_count() const { return ends.size() / 2; }
   bool IsEmpty() const { return ends.empty() && seeds.empty(); }

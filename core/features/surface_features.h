@@ -7,6 +7,7 @@
 #include <limits>
 #include <span>
 
+#include "core/features/part_names.h"
 #include "core/geometry/point.h"
 
 namespace wellspace::core {
@@ -35,11 +36,12 @@ struct SurfaceFeatures {
   std::span<const int32_t> markers;   // m, or none: then all are 0
   std::span<const SolidSeed> seeds;
   SolidRule solids = SolidRule::kEvenOdd;
-  double crease_angle = 30;   // less than between the normals at a crease; 180: none. Unit: degrees
-  double weld = 0;            // points no farther than this from each other become one; a length
-  double resolution = 0;      // the cell of a wrap; a length, 0: kWrapResolution times the diagonal
-  double min_patch = 0;       // patches smaller than its square join a neighbour; a length, 0: 1 % of the diagonal
-  bool keeps_points = false;  // corners of triangles at meshed solids are vertices, as points on no triangle are
+  double crease_angle = 30;  // less than between the normals at a crease; 180: none. Unit: degrees
+  double weld = 0;           // points no farther than this from each other become one; a length
+  double resolution = 0;     // the cell of a wrap; a length, 0: kWrapResolution times the diagonal
+  double min_patch = 0;      // patches smaller than its square join a neighbour; a length, 0: 1 % of the diagonal
+  const PartNames* names = nullptr;  // null: the default ones
+  bool keeps_points = false;         // corners of triangles at meshed solids are vertices, as points on no triangle are
 
   size_t triangle_count() const { return corners.size() / 3; }
 };

@@ -14,6 +14,7 @@
 #include "core/estimate/estimate.h"
 #include "core/input/separation.h"
 #include "core/mesh/mesh_parts.h"
+#include "core/mesh/name_parts.h"
 #include "core/meshers/mesh_estimate.h"
 #include "core/meshers/mesher_checks.h"
 #include "core/meshers/vertex_queries.h"
@@ -30,12 +31,22 @@ namespace {
 template <int D>
 constexpr uint64_t kLeastPredicted = D == 2 ? 50'000 : (D == 3 ? 20'000 : 2'000);
 
+const PartNames* NamesOf(const Input& input) {
+  return input.features.has_value()  ? input.features->names
+         : input.surface.has_value() ? input.surface->names
+                                     : nullptr;
+}
+
 }  // namespace
 
 template <typename Kind>
 absl::Status MesherOf<Kind>::Initialize(const MeshParameters& parameters, const Input& input, RunContext& context) {
   WELLSPACE_RETURN_IF_ERROR(CheckShape(input.points, D));
   WELLSPACE_RETURN_IF_ERROR(CheckInput(input));
+  if (const PartNames* const names = NamesOf(input); names != nullptr) {
+    WELLSPACE_RETURN_IF_ERROR(CheckPartNames(*names));
+    names_ = *names;
+  }
   context.EnterPhase(Phase::kTree);
   WELLSPACE_RETURN_IF_ERROR(ReserveForBuilding<D>(parameters, input.points.size() / D, kTreeBytes<D>,
                                                   BuildingBytes(parameters, input), context));
@@ -191,6 +202,7 @@ absl::StatusOr<Mesh> MesherOf<Kind>::Extract(int threads, RunContext& context) {
   mesh.statistics.max_radius_edge = made.simplices.max_radius_edge;
   mesh.statistics.min_angle_deg = made.simplices.min_angle_deg;
   WELLSPACE_RETURN_IF_ERROR(Describe(mesh, made.faces, threads, context));
+  NameParts(names_, mesh);
   figures_.star_queries.Add(made.simplices.counters);
   context.EnterPhase(Phase::kDone);
   if (!MakesByStage()) {
@@ -232,6 +244,7 @@ absl::Status MesherOf<Kind>::Update(Mesh& mesh, int threads, RunContext& context
   if (const absl::Status described = Describe(mesh, {}, threads, RunContext()); !described.ok()) {
     std::abort();  // that context cannot have been cancelled
   }
+  NameParts(names_, mesh);
   UpdateQuality(simplices, worst_has_gone, mesh);
   figures_.star_queries.Add(simplices.counters);
   context.EnterPhase(Phase::kDone);

@@ -11,6 +11,7 @@
 #include "absl/status/statusor.h"
 #include "core/base/memory/huge_pages.h"
 #include "core/base/run_context.h"
+#include "core/features/part_names.h"
 #include "core/geometry/box.h"
 #include "core/input/frame.h"
 #include "core/input/input.h"
@@ -83,6 +84,7 @@ class MesherOf : public Mesher {
   std::optional<Refinement<Kind>> refinement_;
   VertexNumbering<D> numbering_;
   MesherFigures figures_;
+  PartNames names_;  // of the input
 
  private:
   // Building.

@@ -174,7 +174,7 @@ class Numbers {
         return true;
       }
     }
-    return name.rfind(prefix_, 0) == 0;
+    return IsNumberedName(prefix_, name);
   }
 
   const std::map<int32_t, std::string>& names_;

@@ -59,6 +59,10 @@ void SetFeatures(const FeatureSummary& summary, store::v1::SessionRecord& record
   record.set_faces(summary.faces);
   record.set_crossings(summary.crossings);
   record.set_snap_distance(summary.snap_distance);
+  record.clear_names();
+  if (summary.names.markers_size() + summary.names.regions_size() > 0) {
+    *record.mutable_names() = summary.names;
+  }
   record.clear_surface();
   if (summary.surface.has_value()) {
     *record.mutable_surface() = *summary.surface;

@@ -34,6 +34,7 @@ struct FeatureSummary {
   v1::CrossingRule crossings = v1::CROSSING_RULE_UNSPECIFIED;
   double snap_distance = 0;
   std::optional<v1::SurfaceOptions> surface{};  // without seeds, with defaults; nothing where there is no surface
+  v1::PartNames names{};                        // of either
 
   // Whether a box bounds the domain: so it does where there are no features.
   bool AreInBox() const {

@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
+#include "server/inputs/part_names.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
@@ -124,7 +125,7 @@ absl::Status CheckFaces(const v1::FaceOptions& options, uint64_t first) {
   for (int i = 0; i < options.seeds_size(); ++i) {
     WELLSPACE_RETURN_IF_ERROR(CheckSeed(options.seeds(i), first + i));
   }
-  return absl::OkStatus();
+  return CheckNames(options.names(), v1::ERROR_REASON_INVALID_SEGMENTS, "faces.names");
 }
 
 void PlaneFeatures::Append(const v1::SegmentChunk& chunk, uint64_t known) {
@@ -145,6 +146,9 @@ void PlaneFeatures::Append(const v1::FaceOptions& options, uint64_t known) {
   (void)RuleFromProto(options.faces(), &faces_);
   crossings_ = RuleFromProto(options.crossings());
   snap_distance_ = options.snap_distance();
+  if (options.has_names()) {
+    names_ = NamesFromProto(options.names());
+  }
   for (auto i = static_cast<int>(known); i < options.seeds_size(); ++i) {
     seeds_.Append(SeedFromProto(options.seeds(i)));
   }
@@ -176,7 +180,8 @@ bool PlaneFeatures::HasOtherRules(const v1::FaceOptions& options) const {
   core::FaceRule rule = core::FaceRule::kBox;
   (void)RuleFromProto(options.faces(), &rule);
   return IsEmpty() || rule != faces_ || RuleFromProto(options.crossings()) != crossings_ ||
-         options.snap_distance() != snap_distance_;
+         options.snap_distance() != snap_distance_ ||
+         (options.has_names() && NamesFromProto(options.names()) != names_);
 }
 
 void PlaneFeatures::TakeBack(const FeatureSummary& before) {
@@ -189,6 +194,7 @@ void PlaneFeatures::TakeBack(const FeatureSummary& before) {
   (void)RuleFromProto(before.faces, &faces_);
   crossings_ = RuleFromProto(before.crossings);
   snap_distance_ = before.snap_distance;
+  names_ = NamesFromProto(before.names);
 }
 
 FeatureSummary PlaneFeatures::Summary() const {
@@ -196,7 +202,8 @@ FeatureSummary PlaneFeatures::Summary() const {
           .has_rules = has_rules_,
           .faces = face_rule(),
           .crossings = crossing_rule(),
-          .snap_distance = snap_distance_};
+          .snap_distance = snap_distance_,
+          .names = NamesToProto(names_)};
 }
 
 v1::FaceRule PlaneFeatures::face_rule() const {
@@ -222,7 +229,8 @@ core::Features PlaneFeatures::View() const {
                         .seeds = seeds_,
                         .faces = faces_,
                         .crossings = crossings_,
-                        .snap_distance = snap_distance_};
+                        .snap_distance = snap_distance_,
+                        .names = &names_};
 }
 
 }  // namespace wellspace::server

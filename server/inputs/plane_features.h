@@ -76,6 +76,7 @@ class PlaneFeatures {
   core::FaceRule faces_ = core::FaceRule::kBox;
   core::CrossingRule crossings_ = core::CrossingRule::kRefuse;
   double snap_distance_ = 0;
+  core::PartNames names_;
 };
 
 }  // namespace wellspace::server

@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
+#include "server/inputs/part_names.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
@@ -141,7 +142,7 @@ absl::Status CheckSurface(const v1::SurfaceOptions& options, uint64_t first) {
   for (int i = 0; i < options.seeds_size(); ++i) {
     WELLSPACE_RETURN_IF_ERROR(CheckSeed(options.seeds(i), first + i));
   }
-  return absl::OkStatus();
+  return CheckNames(options.names(), v1::ERROR_REASON_INVALID_TRIANGLES, "surface.names");
 }
 
 void SpaceFeatures::Append(const v1::TriangleChunk& chunk, uint64_t known) {
@@ -152,6 +153,9 @@ void SpaceFeatures::Append(const v1::SurfaceOptions& options, uint64_t known) {
   seeds_.MakeRoom(seed_count() + options.seeds_size() - known);
   has_rules_ = true;
   rules_ = RulesFromProto(options);
+  if (options.has_names()) {
+    names_ = NamesFromProto(options.names());
+  }
   for (auto i = static_cast<int>(known); i < options.seeds_size(); ++i) {
     seeds_.Append(SeedFromProto(options.seeds(i)));
   }
@@ -162,6 +166,7 @@ void SpaceFeatures::TakeBack(const FeatureSummary& before) {
   seeds_.Resize(before.surface.has_value() ? before.counts.seeds : 0);
   has_rules_ = before.has_rules && before.surface.has_value();
   rules_ = RulesFromProto(before.surface.value_or(v1::SurfaceOptions()));
+  names_ = NamesFromProto(before.names);
 }
 
 uint64_t SpaceFeatures::CountEqual(uint64_t first, uint64_t count, const v1::TriangleChunk& chunk) const {
@@ -186,7 +191,8 @@ bool SpaceFeatures::HasOtherRules(const v1::SurfaceOptions& options) const {
   const core::SurfaceFeatures rules = RulesFromProto(options);
   return IsEmpty() || rules.solids != rules_.solids || rules.crease_angle != rules_.crease_angle ||
          rules.weld != rules_.weld || rules.min_patch != rules_.min_patch || rules.resolution != rules_.resolution ||
-         rules.keeps_points != rules_.keeps_points;
+         rules.keeps_points != rules_.keeps_points ||
+         (options.has_names() && NamesFromProto(options.names()) != names_);
 }
 
 FeatureSummary SpaceFeatures::Summary() const {
@@ -196,6 +202,7 @@ FeatureSummary SpaceFeatures::Summary() const {
   if (!IsEmpty()) {
     summary.surface = RulesToProto(rules_);
   }
+  summary.names = NamesToProto(names_);
   return summary;
 }
 
@@ -204,6 +211,7 @@ core::SurfaceFeatures SpaceFeatures::View() const {
   features.corners = triangles_.points();
   features.markers = triangles_.markers();
   features.seeds = seeds_;
+  features.names = &names_;
   return features;
 }
 

@@ -70,6 +70,7 @@ class SpaceFeatures {
   FeatureRows<3> triangles_;
   GrowingArray<core::SolidSeed> seeds_;
   core::SurfaceFeatures rules_;  // without the arrays above
+  core::PartNames names_;
 };
 
 }  // namespace wellspace::server

@@ -51,6 +51,9 @@ v1::Session DescriptionOf(const SessionState& state, const Occupancy& occupancy,
     message.set_snap_distance(record.snap_distance());
   }
   message.set_triangle_count(record.triangles());
+  if (record.has_names()) {
+    *message.mutable_names() = record.names();
+  }
   if (record.has_surface()) {
     *message.mutable_surface() = record.surface();
   }

@@ -13,6 +13,7 @@
 #include "client/cli/mesh_paths.h"
 #include "client/cli/meshing_options.h"
 #include "client/cli/options.h"
+#include "client/cli/part_name_options.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/remote_command.h"
 #include "client/cli/session_options.h"
@@ -37,6 +38,7 @@ struct UploadCommand {
   formats::CloudOptions cloud_options;
   DomainOptions domain;
   SurfaceOptions surface;
+  PartNameOptions part_names;
   std::optional<uint64_t> offset;
   std::optional<uint64_t> segment_offset;
   std::optional<uint64_t> triangle_offset;
@@ -120,6 +122,10 @@ absl::Status UploadCommand::CheckOptions() const {
   if (seed_offset.has_value() && !is_domain && !is_surface) {
     return refuse("--seed-offset", kNoSegments);
   }
+  if (const char* const option = part_names.given(); option != nullptr && !is_domain && !is_surface) {
+    return refuse(option, "IN has points alone, and no markers; give a domain or a surface");
+  }
+  WELLSPACE_RETURN_IF_ERROR(part_names.Check());
   if (!is_surface) {
     WELLSPACE_RETURN_IF_ERROR(surface.CheckOther("IN"));
   }
@@ -140,6 +146,8 @@ absl::StatusOr<client::Uploaded> UploadCommand::Send(client::Client& client, cli
 absl::Status UploadCommand::Upload(client::Client& client, client::CallOptions call, const Interrupt& interrupt) {
   WELLSPACE_ASSIGN_OR_RETURN(const client::Session found, client.GetSession(session, call));
   call.expected_revision = expected_revision;
+  surface.SetNames(part_names.names());
+  domain.SetNames(part_names.names());
   return IsSurface()                                    ? UploadSurface(client, found, call, interrupt)
          : domain.IsDomain(input, cloud_options.format) ? UploadDomain(client, found, call, interrupt)
                                                         : UploadCloud(client, found, call, interrupt);
@@ -326,6 +334,7 @@ void AddUpload(CLI::App& app, int& exit_code) {
   AddCloudOptions(*upload, command->cloud_options, "IN", InputFormats());
   command->domain.AddTo(*upload);
   command->surface.AddMeshingTo(*upload, "IN");
+  command->part_names.AddTo(*upload);
   AddCount(
       *upload, "--offset", [command](uint64_t offset) { command->offset = offset; },
       "Number of the session's points before the first of IN. What is there from it on has to be the same as in IN, "

@@ -10,28 +10,57 @@
 #include "absl/strings/str_cat.h"
 #include "client/formats/domain/interior_point.h"
 #include "client/formats/io/number.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 
-absl::Status GeoJsonFeatures::TakeProperty(GeoJsonLevel& feature, const std::string& name, const double* number,
-                                           std::string_view text) const {
-  if (text == "null" && number == nullptr) {
+absl::StatusOr<int32_t> GeoJsonFeatures::NumberOf(const Value& value, Names& names,
+                                                  std::map<int32_t, std::string>& of_domain) {
+  if (names.has_numbers) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("expected a number, as features before have it, got ", std::string(value.text)));
+  }
+  if (value.string->empty()) {
+    return 0;
+  }
+  const auto [found, is_new] = names.numbers.try_emplace(*value.string, static_cast<int32_t>(names.numbers.size() + 1));
+  if (is_new) {
+    of_domain.emplace(found->second, found->first);
+  }
+  return found->second;
+}
+
+absl::Status GeoJsonFeatures::TakeProperty(GeoJsonLevel& feature, const std::string& name, const Value& value) {
+  const double* const number = value.number;
+  if (number == nullptr && value.string == nullptr && value.text == "null") {
     return absl::OkStatus();
   }
+  const auto refuse = [&](const char* expected, const Names& names) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("expected ", names.numbers.empty() ? expected : "a string", ", got ", std::string(value.text)));
+  };
   if (!options_.region_property.empty() && name == options_.region_property) {
-    if (number == nullptr) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("expected a number for the attribute of the region, got ", std::string(text)));
+    if (value.string != nullptr) {
+      WELLSPACE_ASSIGN_OR_RETURN(const int32_t region, NumberOf(value, regions_, domain_.region_names));
+      feature.region = region > 0 ? std::optional<double>(region) : std::nullopt;
+    } else if (number == nullptr || !regions_.numbers.empty()) {
+      return refuse("a number, or a string, for the attribute of the region", regions_);
+    } else {
+      regions_.has_numbers = true;
+      feature.region = *number;
     }
-    feature.region = *number;
   }
   if (!options_.marker_property.empty() && name == options_.marker_property) {
     constexpr double kLimit = 2147483648.0;
-    if (number == nullptr || *number != std::floor(*number) || *number < -kLimit || *number >= kLimit) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("expected a whole number from -2^31 to below 2^31 for the marker, got ", std::string(text)));
+    if (value.string != nullptr) {
+      WELLSPACE_ASSIGN_OR_RETURN(feature.marker, NumberOf(value, markers_, domain_.marker_names));
+    } else if (number == nullptr || *number != std::floor(*number) || *number < -kLimit || *number >= kLimit ||
+               !markers_.numbers.empty()) {
+      return refuse("a whole number from -2^31 to below 2^31, or a string, for the marker", markers_);
+    } else {
+      markers_.has_numbers = true;
+      feature.marker = static_cast<int32_t>(*number);
     }
-    feature.marker = static_cast<int32_t>(*number);
   }
   return absl::OkStatus();
 }

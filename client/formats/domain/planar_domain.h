@@ -3,6 +3,7 @@
 #define WELLSPACE_CLIENT_FORMATS_DOMAIN_PLANAR_DOMAIN_H_
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -58,6 +59,9 @@ struct PlanarDomain {
   // Of each segment its group, of GeoJSON the first segment of its feature; or empty if all are of one.
   std::vector<uint32_t> groups;
   std::vector<Seed> seeds;          // holes first, then regions; of GeoJSON polygons
+  // Of GeoJSON whose properties are names: these, by the numbers that stand for them, from 1 on.
+  std::map<int32_t, std::string> marker_names;
+  std::map<int32_t, std::string> region_names;
   FaceRule faces = FaceRule::kBox;  // the rule of the format: of .poly HOLES, of polygons UNION, of lines alone BOX
 
   // Counts of parts that were changed, or are not used.

@@ -79,7 +79,7 @@ class GeoJsonReader {
   bool Number(double value, const std::string& text);
   // Null, a boolean or, if it is not null, a string.
   bool Scalar(std::string_view text, const std::string* string);
-  bool Property(const double* number, std::string_view text);
+  bool Property(const GeoJsonFeatures::Value& value);
   bool TakeType(const std::string& name);
   bool StartObjectIn(Level& parent);
   bool StartArrayIn(Level& object);
@@ -189,9 +189,10 @@ bool GeoJsonReader::Number(double value, const std::string& written) {
   AppendNumber(value, text);
   if (!levels_.empty() && levels_.back().kind == Level::kProperties) {
     if (IsRoundedWhole(written, value)) {
-      return Property(nullptr, absl::StrCat(written, ", which no double is"));
+      const std::string rounded = absl::StrCat(written, ", which no double is");
+      return Property({.text = rounded});
     }
-    return Property(&value, text);
+    return Property({.number = &value, .text = text});
   }
   return Scalar(text, nullptr);
 }
@@ -206,7 +207,7 @@ bool GeoJsonReader::Scalar(std::string_view text, const std::string* string) {
   }
   Level& level = levels_.back();
   if (level.kind == Level::kProperties) {
-    return Property(nullptr, shown);
+    return Property({.string = string, .text = shown});
   }
   if (level.kind != Level::kObject) {
     return FailKind(shown);
@@ -247,8 +248,8 @@ bool GeoJsonReader::TakeType(const std::string& name) {
   return true;
 }
 
-bool GeoJsonReader::Property(const double* number, std::string_view text) {
-  const absl::Status status = features_.TakeProperty(levels_[levels_.size() - 2], property_, number, text);
+bool GeoJsonReader::Property(const GeoJsonFeatures::Value& value) {
+  const absl::Status status = features_.TakeProperty(levels_[levels_.size() - 2], property_, value);
   return status.ok() || Fail(std::string(status.message()));
 }
 

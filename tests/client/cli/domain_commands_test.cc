@@ -7,6 +7,7 @@
 #include <numbers>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -109,6 +110,27 @@ TEST_F(DomainCommandsTest, PolyWithAHoleAndMarkers) {
   ASSERT_EQ(mesh->boundary.size(), 2u);
   EXPECT_THAT((std::vector<int32_t>{mesh->boundary[0].tag, mesh->boundary[1].tag}), ElementsAre(5, 9));
   EXPECT_EQ(mesh->boundary[1].name, "marker_9");
+}
+
+TEST_F(DomainCommandsTest, PartsHaveTheNamesThatAreGiven) {
+  Mesh("frame.poly", kFrame, {"--names", "9=the hole", "--names", "5=wall", "--region-names", "1=steel"});
+  ExpectValid("frame.poly");
+  const auto mesh = formats::ReadMesh(Path("out.msh"));
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  ASSERT_EQ(mesh->boundary.size(), 2u);
+  EXPECT_EQ(mesh->boundary[0].name, "wall");
+  EXPECT_EQ(mesh->boundary[1].name, "the hole");
+  ASSERT_EQ(mesh->regions.size(), 1u);
+  EXPECT_EQ(mesh->regions[0].name, "steel");
+
+  for (const auto& [option, value, message] : {std::tuple("--names", "inlet", "expected NUMBER=NAME"),
+                                               {"--names", "9999999999=a", "expected NUMBER=NAME"},
+                                               {"--names", "5=", "names.markers[5]: expected a name"},
+                                               {"--region-names", "5=domain", "names.regions[5]"}}) {
+    EXPECT_THAT(MeshFails("frame.poly", kFrame, {option, value}), HasSubstr(message));
+  }
+  EXPECT_THAT(MeshFails("frame.poly", kFrame, {"--names", "5=a", "--names", "5=b"}), HasSubstr("5 has a name already"));
+  EXPECT_THAT(MeshFails("cloud.csv", "0,0\n1,0\n0,1\n", {"--names", "5=a"}), HasSubstr("--names: IN has points alone"));
 }
 
 TEST_F(DomainCommandsTest, GeoJsonHasIslandsInLakes) {

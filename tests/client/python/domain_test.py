@@ -24,6 +24,49 @@ class DomainTest(Case):
         self.assertEqual(mesh.statistics.domain.segments, 8)
         self.assertEqual(mesh.statistics.domain.min_input_angle_deg, 90)
 
+    def test_names(self):
+        walls = ["wall"] * 4 + ["inlet"] * 4
+        mesh = wellspace.mesh(POINTS, segments=RINGS, markers=walls, regions=[(0.5, 0.5, "steel"), (2, 2, "air")])
+        self.assertEqual(set(mesh.facet_names.values()), {"wall", "inlet"})
+        self.assertEqual(set(mesh.region_names.values()), {"steel", "air"})
+        edges = mesh.points[mesh.boundary("inlet")]
+        self.assertAlmostEqual(np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1).sum(), 4)
+        np.testing.assert_array_equal(mesh.boundary(mesh.tag("inlet")), mesh.boundary("inlet"))
+        np.testing.assert_array_equal(mesh.region(2), mesh.region("air"))
+
+        named = wellspace.mesh(POINTS, segments=RINGS, markers=MARKERS, marker_names={9: "inlet"},
+                               regions=[(2, 2, 7)], region_names={7: "air"})
+        self.assertEqual(named.facet_names, {1: "marker_1", 9: "inlet"})
+        np.testing.assert_array_equal(named.boundary(9), named.boundary("inlet"))
+        self.assertEqual(named.region_names[7], "air")
+        for name in ("outlet", 5, True):
+            with self.subTest(name), self.fails(InvalidArgumentError, "9: 'inlet'", field="name"):
+                named.boundary(name)
+
+    def test_numbers_that_are_taken_get_no_name(self):
+        mesh = wellspace.mesh(POINTS, segments=RINGS, regions=[(0.5, 0.5, 1), (2, 2, "air")])
+        self.assertEqual(mesh.region_names, {1: "region_1", 2: "air"})
+
+    def test_names_of_sessions(self):
+        with wellspace.Session(2) as session:
+            session.upload(POINTS)
+            session.add_segments(segments=RINGS[:4], markers=["wall"] * 4)
+            session.add_segments(segments=RINGS[4:], markers=["inlet", "wall", "", "inlet"])
+            session.refine()
+            self.assertEqual(sorted(session.download().facet_names.values()), ["inlet", "unmarked", "wall"])
+
+    def test_wrong_names(self):
+        for given, message, field in (
+            ({"marker_names": ["inlet"]}, "expected a dict", "marker_names"),
+            ({"marker_names": {"a": "inlet"}}, "whole numbers", "marker_names"),
+            ({"marker_names": {5: 5}}, "expected a name", "marker_names[5]"),
+            ({"marker_names": {5: "a", 7: "a"}}, "names.markers[7]: it has the name of 5", "faces.names"),
+            ({"region_names": {7: "domain"}}, "names.regions[7]: expected a name", "faces.names"),
+            ({"markers": ["a", "b"]}, "8 whole numbers", "markers"),
+        ):
+            with self.subTest(given), self.fails(InvalidArgumentError, message, field=field):
+                wellspace.mesh(POINTS, segments=RINGS, **given)
+
     def test_rules(self):
         for given, area in (
             ({}, 16),

@@ -81,6 +81,14 @@ class SurfaceTest(Case):
             with self.fails(InvalidArgumentError, message):
                 wellspace.mesh(points, triangles=triangles, **given)
 
+    def test_names(self):
+        mesh = wellspace.mesh(CORNERS, triangles=CUBE, markers=["low"] * 2 + ["side"] * 10,
+                              regions=[(0.5, 0.5, 0.5, "steel")])
+        self.assertEqual(set(mesh.facet_names.values()), {"low", "side"})
+        self.assertEqual(set(mesh.region_names.values()), {"steel"})
+        with self.fails(InvalidArgumentError, "names.markers[3]", field="surface.names"):
+            wellspace.mesh(CORNERS, triangles=CUBE, marker_names={3: ""})
+
     def test_points_of_the_surface_are_kept(self):
         mesh = wellspace.mesh(CORNERS, triangles=CUBE, facet_length=0.3, keep_points=True)
         np.testing.assert_array_equal(mesh.points[mesh.input_vertices], CORNERS)

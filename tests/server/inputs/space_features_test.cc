@@ -84,6 +84,35 @@ TEST(SpaceFeatures, TheLastOptionsHoldAndSeedsAddUp) {
   EXPECT_TRUE(store.IsEmpty());
 }
 
+TEST(SpaceFeatures, NamesStayUntilOthersCome) {
+  SpaceFeatures store;
+  v1::SurfaceOptions options = Surface(v1::SOLID_RULE_HOLES, {});
+  options.set_keep_points(true);
+  (*options.mutable_names()->mutable_markers())[7] = "inlet";
+  (*options.mutable_names()->mutable_regions())[2] = "steel";
+  store.Append(options);
+  EXPECT_FALSE(store.HasOtherRules(options));
+  EXPECT_TRUE(store.View().keeps_points);
+  EXPECT_EQ(store.View().names->markers.at(7), "inlet");
+  const FeatureSummary before = store.Summary();
+  EXPECT_EQ(before.names.regions().at(2), "steel");
+  EXPECT_TRUE(before.surface->keep_points());
+
+  options.clear_names();
+  EXPECT_FALSE(store.HasOtherRules(options)) << "none are no other ones";
+  store.Append(options);
+  EXPECT_EQ(store.View().names->markers.size(), 1u);
+  (*options.mutable_names()->mutable_markers())[7] = "outlet";
+  EXPECT_TRUE(store.HasOtherRules(options));
+  store.Append(options);
+  EXPECT_EQ(store.View().names->markers.at(7), "outlet");
+  EXPECT_TRUE(store.View().names->regions.empty()) << "both tables are replaced";
+  store.TakeBack(before);
+  EXPECT_EQ(store.View().names->markers.at(7), "inlet");
+  options.set_keep_points(false);
+  EXPECT_TRUE(store.HasOtherRules(options));
+}
+
 TEST(SpaceFeatures, FindsTheFirstThatIsAnother) {
   SpaceFeatures store;
   store.Append(Chunk({0, 1, 2, 1, 2, 3, 2, 3, 4}, {4, 0, 6}));

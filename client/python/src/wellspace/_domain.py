@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Protocol, TypedDict
 
+import numpy as np
+
 from ._arrays import number
+from ._names import NameTable
 from .errors import InvalidArgumentError
 
 # Segments or triangles, and seeds, of one message: about 256 KiB.
@@ -16,19 +19,25 @@ SEEDS_OF_A_REQUEST = 4_096
 
 class DomainArguments(TypedDict, total=False):
     """
-    markers : (m,) int
-        A marker for each of `segments`, or of `triangles`, which tells parts of the boundary apart: see
-        `Mesh.facet_names`. Default: 0.
+    markers : (m,) int or str
+        A marker for each of `segments`, or of `triangles`, which tells parts of the boundary apart, or the name of its
+        part: see `Mesh.facet_names`. Default: 0, and "" stands for it.
+    marker_names : dict of int to str
+        The names of parts by their markers. Default: ``"marker_7"`` and the like.
     holes : (h, d) float
         Points in faces, or in solids, that are not meshed.
     regions : sequence of RegionSeed, RegionPolygon, SolidSeed, or (x, y, region, max_area)
         Points in faces, or in solids, that are a region of their own, or that have a largest simplex; or polygons of
-        faces. In 3-D (x, y, z, region, max_volume).
+        faces. In 3-D (x, y, z, region, max_volume). Regions are numbers or names.
+    region_names : dict of int to str
+        The names of regions by their numbers. Default: ``"region_7"`` and the like.
     """
 
     markers: Any
+    marker_names: Mapping[int, str]
     holes: Any
     regions: Any
+    region_names: Mapping[int, str]
 
 
 class Bounds(Protocol):
@@ -59,9 +68,26 @@ def whole(value: Any, name: str, what: str, low: int, high: int) -> int:
     return int(value)
 
 
-def region_of(value: Any, name: str) -> int:
-    """The number of a region."""
-    return whole(value, name, "region", -(2**31), 2**31)
+def region_of(value: Any, name: str, names: NameTable) -> int:
+    """The number of a region, which may be given by its name."""
+    return names.number_of(value) if isinstance(value, str) else whole(value, name, "region", -(2**31), 2**31)
+
+
+def name_tables(given: Mapping[str, Any], before: Any) -> tuple[NameTable, NameTable]:
+    """The names of parts and those of regions; `before`: the PartNames of a session, or None."""
+    return (
+        NameTable(given.get("marker_names", {}), "marker_names", before and before.markers),
+        NameTable(given.get("region_names", {}), "region_names", before and before.regions),
+    )
+
+
+def numbers_of_regions(regions: Sequence[Any], at: int) -> Iterator[int]:
+    """The numbers among the regions of seeds, which are attributes, or stand at `at` in their rows."""
+    for one in regions:
+        row = one if isinstance(one, (tuple, list, np.ndarray)) else ()
+        region = row[at] if len(row) > at else getattr(one, "region", 0)
+        if isinstance(region, (int, np.integer)):
+            yield int(region)
 
 
 def bound_of(value: Any, name: str, what: str) -> float:

@@ -22,6 +22,13 @@ from .statistics import statistics_of
 STEINER, REPAIR, CORNER = -1, -2, -3
 
 
+def _number_of(name: str | int, names: Mapping[int, str]) -> int | None:
+    """The number of a name among `names`, or the number itself; None if it is not there."""
+    if isinstance(name, (int, np.integer)) and not isinstance(name, bool):
+        return int(name) if int(name) in names else None
+    return next((number for number, other in names.items() if other == name), None)
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Mesh(MeshArrays):
     """A simplicial mesh of n vertices and m simplices in d dimensions.
@@ -44,14 +51,15 @@ class Mesh(MeshArrays):
     facet_tags : (f,) int32
         The tag of each facet, above 0.
     facet_names : dict of int to str
-        The name of each tag: ``"xmin"``, ``"xmax"``, ``"ymin"`` … of the box, ``"marker_7"`` or ``"unmarked"`` of
-        segments and triangles.
+        The name of each tag: ``"xmin"``, ``"xmax"``, ``"ymin"`` … of the box; of segments and triangles the name that
+        was given to their marker, or ``"marker_7"`` or ``"unmarked"``.
     ridges : (r, 2) int
         Of a surface: the edges on its creases.
     regions : (m,) int32
         The region of each simplex.
     region_names : dict of int to str
-        The name of each region: ``"domain"``, or ``"region_7"`` for the region 7 of a `RegionSeed` or `SolidSeed`.
+        The name of each region: the one that was given, ``"domain"``, or ``"region_7"`` for the region 7 of a
+        `RegionSeed` or `SolidSeed`.
     vertex_origins : (n,) int
         Where each vertex comes from: the number of the first input point that became it, or -1: the refinement, -2: the
         repair of slivers, -3: it is a corner of the box.
@@ -75,29 +83,35 @@ class Mesh(MeshArrays):
     def __repr__(self) -> str:
         return f"<wellspace.Mesh: {len(self.points)} vertices, {len(self.simplices)} simplices in {self.dimension}-D>"
 
-    def tag(self, name: str) -> int:
-        """The tag of the part of the boundary with this name."""
-        for tag, other in self.facet_names.items():
-            if other == name:
-                return tag
-        names = ", ".join(map(repr, self.facet_names.values())) or "none: the mesh has no boundary"
-        raise InvalidArgumentError(f"no part of the boundary is called {name!r}; there are {names}", field="name")
+    def tag(self, name: str | int) -> int:
+        """The tag of the part of the boundary with this name, or the number itself if a part has it for a tag."""
+        tag = _number_of(name, self.facet_names)
+        if tag is None:
+            there = ", ".join(f"{tag}: {name!r}" for tag, name in self.facet_names.items())
+            raise InvalidArgumentError(
+                f"no part of the boundary is called {name!r}; there are {there or 'none: the mesh has no boundary'}",
+                field="name",
+            )
+        return tag
 
-    def boundary(self, name: str | None = None) -> npt.NDArray[Any]:
-        """The facets with this name, (k, d); without a name all."""
+    def boundary(self, name: str | int | None = None) -> npt.NDArray[Any]:
+        """The facets with this name, or tag, (k, d); without a name all."""
         return self.facets if name is None else self.facets[self.facet_tags == self.tag(name)]
 
-    def boundary_vertices(self, name: str | None = None) -> npt.NDArray[Any]:
+    def boundary_vertices(self, name: str | int | None = None) -> npt.NDArray[Any]:
         """The vertices of these facets, ascending, each once."""
         return np.unique(self.boundary(name))
 
-    def region(self, name: str) -> npt.NDArray[Any]:
-        """The simplices of the region with this name, (k, d + 1)."""
-        for number, other in self.region_names.items():
-            if other == name:
-                return self.simplices[self.regions == number]
-        names = ", ".join(map(repr, self.region_names.values())) or "none: the mesh was asked for without them"
-        raise InvalidArgumentError(f"no region is called {name!r}; there are {names}", field="name")
+    def region(self, name: str | int) -> npt.NDArray[Any]:
+        """The simplices of the region with this name, or number, (k, d + 1)."""
+        number = _number_of(name, self.region_names)
+        if number is None:
+            there = ", ".join(f"{number}: {name!r}" for number, name in self.region_names.items())
+            raise InvalidArgumentError(
+                f"no region is called {name!r}; there are {there or 'none: the mesh was asked for without them'}",
+                field="name",
+            )
+        return self.simplices[self.regions == number]
 
     def dual_cells(self) -> DualCells:
         """The Voronoi cell of each vertex within the domain, as finite volumes need them. For 2-D and 3-D.

@@ -11,16 +11,19 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _api, _wire
-from ._arrays import Floats, Indices, choice, coordinates, indices, whole_numbers
+from ._arrays import Floats, Indices, choice, coordinates, indices
 from ._domain import (
     ROWS_OF_A_REQUEST,
     SEEDS_OF_A_REQUEST,
     DomainArguments,
     bound_of,
     length_of,
+    name_tables,
+    numbers_of_regions,
     region_of,
     whole,
 )
+from ._names import NameTable, names_message
 from .errors import InvalidArgumentError
 
 _FACES = _api.enum_numbers("FaceRule")
@@ -35,7 +38,7 @@ class RegionSeed:
     ----------
     x, y : float
         In the unit of the points. Not on a segment.
-    region : int
+    region : int or str
         The region of the triangles there, see `Mesh.regions`: the name is ``"region_7"`` for 7. 0: that of faces
         without a seed.
     max_area : float
@@ -44,7 +47,7 @@ class RegionSeed:
 
     x: float
     y: float
-    region: int = 0
+    region: int | str = 0
     max_area: float = math.inf
 
 
@@ -58,7 +61,7 @@ class RegionPolygon:
     ----------
     first, count : int
         The rows of `segments` that are its rings: so many from the first on. Each ring is closed.
-    region : int
+    region : int or str
         See `RegionSeed`.
     max_area : float
         See `RegionSeed`.
@@ -66,7 +69,7 @@ class RegionPolygon:
 
     first: int
     count: int
-    region: int = 0
+    region: int | str = 0
     max_area: float = math.inf
 
 
@@ -83,6 +86,7 @@ class Plane:
     crossings: int
     groups: npt.NDArray[np.uint32] | None  # (m,)
     snap_distance: float | None
+    names: Any  # a PartNames; None: there are none
 
     request_fields = (4, 5)
     method = "AddSegments"
@@ -121,6 +125,8 @@ class Plane:
             options = _api.message("FaceOptions")(faces=self.faces, crossings=self.crossings)
             if self.snap_distance is not None:
                 options.snap_distance = self.snap_distance
+            if first == 0 and self.names is not None:
+                options.names.CopyFrom(self.names)
             options.seeds.extend(seeds[first : first + SEEDS_OF_A_REQUEST])
             yield first, options.SerializeToString()
 
@@ -157,28 +163,38 @@ class PlaneArguments(DomainArguments, total=False):
     snap_distance: float
 
 
-def make_plane(given: Mapping[str, Any], point_count: int | None = None, has_box: bool = False) -> Plane:
-    """Checks the PlaneArguments that are given; `point_count` is None where points may come later."""
+def make_plane(
+    given: Mapping[str, Any], point_count: int | None = None, has_box: bool = False, names_before: Any = None
+) -> Plane:
+    """Checks the PlaneArguments that are given; `point_count` is None where points may come later.
+
+    `names_before`: a PartNames, the names that a session has already.
+    """
     closed = indices(given.get("segments", []), "segments", 2, point_count)
     opened = indices(given.get("open_segments", []), "open_segments", 2, point_count)
+    marker_names, region_names = name_tables(given, names_before)
     marked = None
     if "markers" in given or "open_markers" in given:
         parts = (("markers", len(closed)), ("open_markers", len(opened)))
         marked = np.concatenate(
-            [whole_numbers(given.get(name, np.zeros(size, np.int32)), name, size) for name, size in parts]
+            [marker_names.numbers_of(given.get(name, np.zeros(size, np.int32)), name, size) for name, size in parts]
         )
     rule = given.get("faces", "box" if has_box else "holes")
     snap_distance = given.get("snap_distance")
+    regions = list(given.get("regions", ()))
+    region_names.take(numbers_of_regions(regions, at=2))
+    seeds = tuple(_seed(one, f"regions[{row}]", len(closed), region_names) for row, one in enumerate(regions))
     return Plane(
         ends=np.concatenate([closed, opened]),
         markers=marked,
         first_open=len(closed),
         holes=coordinates(given.get("holes", []), "holes", 2),
-        regions=tuple(_seed(one, f"regions[{row}]", len(closed)) for row, one in enumerate(given.get("regions", ()))),
+        regions=seeds,
         faces=choice(rule, "faces", _FACES),
         crossings=choice(given.get("crossings", "refuse"), "crossings", _CROSSINGS),
         groups=_groups(given.get("groups"), len(closed), len(opened)),
         snap_distance=None if snap_distance is None else length_of(snap_distance, "snap_distance"),
+        names=names_message(marker_names, region_names),
     )
 
 
@@ -202,17 +218,17 @@ def _groups(given: Any, closed: int, opened: int) -> npt.NDArray[np.uint32] | No
     return np.concatenate([numbers.astype(np.uint32), np.zeros(opened, np.uint32)])
 
 
-def _polygon(given: RegionPolygon, name: str, segments: int) -> RegionPolygon:
+def _polygon(given: RegionPolygon, name: str, segments: int, names: NameTable) -> RegionPolygon:
     first = whole(given.first, name, "first segment", 0, max(segments, 1))
     count = whole(given.count, name, "count of segments", 1, max(segments - first + 1, 2))
-    region = region_of(given.region, name)
+    region = region_of(given.region, name, names)
     return RegionPolygon(first, count, region, bound_of(given.max_area, name, "max_area"))
 
 
-def _seed(value: Any, name: str, segments: int) -> RegionSeed | RegionPolygon:
+def _seed(value: Any, name: str, segments: int, names: NameTable) -> RegionSeed | RegionPolygon:
     """A RegionPolygon of so many segments, a RegionSeed, or (x, y[, region[, max_area]])."""
     if isinstance(value, RegionPolygon):
-        return _polygon(value, name, segments)
+        return _polygon(value, name, segments, names)
     if isinstance(value, RegionSeed):
         value = dataclasses.astuple(value)
     row = list(value) if isinstance(value, (tuple, list, np.ndarray)) else []
@@ -220,4 +236,4 @@ def _seed(value: Any, name: str, segments: int) -> RegionSeed | RegionPolygon:
         raise InvalidArgumentError(f"{name} is {value!r}; expected (x, y, region, max_area)", field=name)
     x, y, region, max_area = (*row, 0, math.inf)[:4] if len(row) < 3 else (*row, math.inf)[:4]
     place = coordinates([[x, y]], name, 2)[0].tolist()
-    return RegionSeed(place[0], place[1], region_of(region, name), bound_of(max_area, name, "max_area"))
+    return RegionSeed(place[0], place[1], region_of(region, name, names), bound_of(max_area, name, "max_area"))

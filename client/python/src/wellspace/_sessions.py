@@ -208,7 +208,7 @@ class Session:
         (given,) = split("add_segments", arguments, PlaneArguments)
         options = CallOptions(timeout=timeout, cancel=cancel)
         session = self._get(options)
-        bounds = make_plane(given, has_box=session.parameters.HasField("domain"))
+        bounds = make_plane(given, has_box=session.parameters.HasField("domain"), names_before=session.names)
         self._add_bounds(bounds, session, offset, expected_revision, options)
 
     @takes(DomainArguments, TriangleArguments)
@@ -237,7 +237,9 @@ class Session:
             )
         (given,) = split("add_triangles", arguments, SurfaceArguments)
         options = CallOptions(timeout=timeout, cancel=cancel)
-        self._add_bounds(make_surface(given), self._get(options), offset, expected_revision, options)
+        session = self._get(options)
+        bounds = make_surface(given, names_before=session.names)
+        self._add_bounds(bounds, session, offset, expected_revision, options)
 
     def _add_bounds(
         self,

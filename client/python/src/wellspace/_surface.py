@@ -11,15 +11,18 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _api, _wire
-from ._arrays import Floats, Indices, choice, coordinates, indices, number, whole_numbers
+from ._arrays import Floats, Indices, choice, coordinates, indices, number
 from ._domain import (
     ROWS_OF_A_REQUEST,
     SEEDS_OF_A_REQUEST,
     DomainArguments,
     bound_of,
     length_of,
+    name_tables,
+    numbers_of_regions,
     region_of,
 )
+from ._names import NameTable, names_message
 from .errors import InvalidArgumentError
 
 _SOLIDS = _api.enum_numbers("SolidRule")
@@ -33,7 +36,7 @@ class SolidSeed:
     ----------
     x, y, z : float
         In the unit of the points. Not on a triangle.
-    region : int
+    region : int or str
         The region of the tetrahedra there, see `Mesh.regions`: the name is ``"region_7"`` for 7. 0: that of solids
         without a seed.
     max_volume : float
@@ -43,7 +46,7 @@ class SolidSeed:
     x: float
     y: float
     z: float
-    region: int = 0
+    region: int | str = 0
     max_volume: float = math.inf
 
 
@@ -58,6 +61,7 @@ class Surface:
     solids: int
     numbers: dict[str, float]  # crease_angle, weld and such, as far as they are given
     keep_points: bool
+    names: Any  # a PartNames; None: there are none
 
     request_fields = (7, 8)
     method = "AddTriangles"
@@ -89,6 +93,8 @@ class Surface:
             options = _api.message("SurfaceOptions")(
                 solids=self.solids, keep_points=self.keep_points, **self.numbers
             )
+            if first == 0 and self.names is not None:
+                options.names.CopyFrom(self.names)
             options.seeds.extend(seeds[first : first + SEEDS_OF_A_REQUEST])
             yield first, options.SerializeToString()
 
@@ -133,8 +139,16 @@ class SurfaceArguments(DomainArguments, TriangleArguments, total=False):
     """The arguments of a domain in space."""
 
 
-def make_surface(given: Mapping[str, Any], point_count: int | None = None) -> Surface:
-    """Checks the SurfaceArguments that are given; `point_count` is None where points may come later."""
+def make_surface(
+    given: Mapping[str, Any], point_count: int | None = None, names_before: Any = None
+) -> Surface:
+    """Checks the SurfaceArguments that are given; `point_count` is None where points may come later.
+
+    `names_before`: a PartNames, the names that a session has already.
+    """
+    marker_names, region_names = name_tables(given, names_before)
+    regions = list(given.get("regions", ()))
+    region_names.take(numbers_of_regions(regions, at=3))
     corners = indices(given.get("triangles", []), "triangles", 3, point_count)
     numbers = {name: length_of(given[name], name) for name in ("weld", "min_patch", "resolution") if name in given}
     if "crease_angle" in given:
@@ -145,16 +159,17 @@ def make_surface(given: Mapping[str, Any], point_count: int | None = None) -> Su
             )
     return Surface(
         corners=corners,
-        markers=whole_numbers(given["markers"], "markers", len(corners)) if "markers" in given else None,
+        markers=marker_names.numbers_of(given["markers"], "markers", len(corners)) if "markers" in given else None,
         holes=coordinates(given.get("holes", []), "holes", 3),
-        regions=tuple(_seed(one, f"regions[{row}]") for row, one in enumerate(given.get("regions", ()))),
+        regions=tuple(_seed(one, f"regions[{row}]", region_names) for row, one in enumerate(regions)),
         solids=choice(given.get("solids", "even-odd"), "solids", _SOLIDS),
         numbers=numbers,
         keep_points=bool(given.get("keep_points", False)),
+        names=names_message(marker_names, region_names),
     )
 
 
-def _seed(value: Any, name: str) -> SolidSeed:
+def _seed(value: Any, name: str, names: NameTable) -> SolidSeed:
     """A SolidSeed, or (x, y, z[, region[, max_volume]])."""
     if isinstance(value, SolidSeed):
         value = dataclasses.astuple(value)
@@ -163,4 +178,4 @@ def _seed(value: Any, name: str) -> SolidSeed:
         raise InvalidArgumentError(f"{name} is {value!r}; expected (x, y, z, region, max_volume)", field=name)
     x, y, z, region, max_volume = (*row, 0, math.inf)[:5] if len(row) < 4 else (*row, math.inf)[:5]
     x, y, z = coordinates([[x, y, z]], name, 3)[0].tolist()
-    return SolidSeed(x, y, z, region_of(region, name), bound_of(max_volume, name, "max_volume"))
+    return SolidSeed(x, y, z, region_of(region, name, names), bound_of(max_volume, name, "max_volume"))

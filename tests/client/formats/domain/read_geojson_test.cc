@@ -275,10 +275,9 @@ TEST_F(ReadGeoJsonTest, WholeNumbersThatNoDoubleIsAreNamed) {
                                                   "the first is 9007199254740993 at coordinates[1][0]")));
   EXPECT_THAT(ReadGeometry("Point", "[9007199254740992,1]").notes, IsEmpty());
   const std::string feature = Feature(Geometry("Polygon", "[" + Square(0, 0, 4) + "]"), R"({"r": 9007199254740993})");
-  EXPECT_THAT(
-      ReadBad("a.geojson", feature, {.region_property = "r"}),
-      HasSubstr("properties.r: expected a number for the attribute of the region, got 9007199254740993, which no "
-                "double is"));
+  EXPECT_THAT(ReadBad("a.geojson", feature, {.region_property = "r"}),
+              HasSubstr("properties.r: expected a number, or a string, for the attribute of the region, got "
+                        "9007199254740993, which no double is"));
 }
 
 TEST_F(ReadGeoJsonTest, ErrorsOfGeometryNameThePath) {
@@ -370,15 +369,42 @@ TEST_F(ReadGeoJsonTest, PropertiesOfOtherKindsAreRefused) {
     return ReadBad("a.geojson", Features({Feature(polygon, properties)}),
                    {.region_property = "kind", .marker_property = "side"});
   };
-  EXPECT_EQ(message(R"({"kind":"water"})"),
-            "a.geojson:1: features[0].properties.kind: expected a number for the "
-            "attribute of the region, got \"water\"");
+  EXPECT_EQ(
+      message(R"({"kind":true})"),
+      "a.geojson:1: features[0].properties.kind: expected a number, or a string, for the attribute of the region, "
+      "got true");
   EXPECT_THAT(message(R"({"kind":[1]})"), HasSubstr("got an array"));
   EXPECT_THAT(message(R"({"side":1.5})"),
-              HasSubstr("expected a whole number from -2^31 to below 2^31 for the marker, got 1.5"));
+              HasSubstr("expected a whole number from -2^31 to below 2^31, or a string, for the marker, got 1.5"));
   EXPECT_THAT(message(R"({"side":2147483648})"), HasSubstr("got 2147483648"));
   EXPECT_THAT(message(R"({"side":true})"), HasSubstr("features[0].properties.side: "));
   EXPECT_THAT(message(R"({"side":{"side":1}})"), HasSubstr("got an object"));
+}
+
+TEST_F(ReadGeoJsonTest, PropertiesThatAreStringsAreNames) {
+  const auto polygon = [](double low) { return Geometry("Polygon", "[" + Square(low, low, 1) + "]"); };
+  const DomainOptions options{.region_property = "kind", .marker_property = "side"};
+  const PlanarDomain domain = ReadGood("a.geojson",
+                                       Features({Feature(polygon(0), R"({"kind":"water","side":"shore"})"),
+                                                 Feature(polygon(2), R"({"kind":"land","side":"shore"})"),
+                                                 Feature(polygon(4), R"({"kind":"water","side":"quay"})"),
+                                                 Feature(polygon(6), R"({"kind":"","side":""})")}),
+                                       options);
+  EXPECT_THAT(domain.region_names, ElementsAre(std::pair(1, "water"), std::pair(2, "land")));
+  EXPECT_THAT(domain.marker_names, ElementsAre(std::pair(1, "shore"), std::pair(2, "quay")));
+  ASSERT_EQ(domain.seeds.size(), 3u) << "an empty name is none";
+  EXPECT_EQ(domain.seeds[0].attribute, 1);
+  EXPECT_EQ(domain.seeds[1].attribute, 2);
+  EXPECT_EQ(domain.seeds[2].attribute, 1);
+  EXPECT_THAT(domain.markers, ElementsAre(1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 2, 2, 0, 0, 0, 0));
+
+  const auto message = [&](const char* first, const char* second) {
+    return ReadBad("a.geojson", Features({Feature(polygon(0), first), Feature(polygon(2), second)}), options);
+  };
+  EXPECT_THAT(message(R"({"kind":"water"})", R"({"kind":1})"),
+              HasSubstr("features[1].properties.kind: expected a string, got 1"));
+  EXPECT_THAT(message(R"({"side":1})", R"({"side":"shore"})"),
+              HasSubstr("features[1].properties.side: expected a number, as features before have it, got \"shore\""));
 }
 
 TEST_F(ReadGeoJsonTest, DeepNestingIsRefused) {
@@ -413,7 +439,7 @@ TEST_F(ReadGeoJsonTest, LinesMayEndInAnyWay) {
 TEST_F(ReadGeoJsonTest, CutFilesAreRefused) {
   const std::string text = Features({Feature(Geometry("Polygon", "[" + Square(0, 0, 1) + "]"), R"({"a":[1,{}]})")});
   for (size_t size = 0; size < text.size(); ++size) {
-    const absl::StatusOr<PlanarDomain> domain = Read("a.geojson", text.substr(0, size));
+    const absl::StatusOr<PlanarDomain> domain = ReadGood("a.geojson", text.substr(0, size));
     EXPECT_EQ(domain.status().code(), absl::StatusCode::kInvalidArgument) << size;
     EXPECT_THAT(domain.status().message(), HasSubstr("a.geojson:1: ")) << size;
   }
