@@ -7,8 +7,8 @@
 
 namespace wellspace::core {
 
-// Gives names to the parts of the boundary of `mesh` whose markers have one, and to its regions; the others keep theirs.
-// A mesh of one region has that of its number, whether seeds gave it or not.
+// Gives names to the parts of the boundary of `mesh` whose markers have one, and to its regions; the others keep
+// theirs. A mesh of one region has that of its number, whether seeds gave it or not.
 //
 // REQUIRES:   CheckPartNames(names) is OK; parts of the mesh have their default names.
 // Complexity: O(parts log names).

@@ -58,7 +58,7 @@ struct PlanarDomain {
   std::vector<uint8_t> is_line;
   // Of each segment its group, of GeoJSON the first segment of its feature; or empty if all are of one.
   std::vector<uint32_t> groups;
-  std::vector<Seed> seeds;          // holes first, then regions; of GeoJSON polygons
+  std::vector<Seed> seeds;  // holes first, then regions; of GeoJSON polygons
   // Of GeoJSON whose properties are names: these, by the numbers that stand for them, from 1 on.
   std::map<int32_t, std::string> marker_names;
   std::map<int32_t, std::string> region_names;
