@@ -100,6 +100,16 @@ TEST_F(FileCommandsTest, ConvertKeepsBoundaryRegionsNamesAndAttributes) {
   EXPECT_THAT(RunWellspace({"convert", Path("none.msh"), Path("d.vtu")}).err, HasSubstr("none.msh"));
 }
 
+// Origins of vertices come back from .npz.
+TEST_F(FileCommandsTest, ConvertKeepsOriginsOfNpz) {
+  Mesh(kPlane, "a.npz");
+  Mesh(kPlane, "a.vtu");
+  ASSERT_EQ(RunWellspace({"convert", Path("a.npz"), Path("b.vtu")}).exit_code, 0);
+  EXPECT_EQ(folder_.Read("b.vtu"), folder_.Read("a.vtu"));
+  ASSERT_EQ(RunWellspace({"convert", Path("b.vtu"), Path("b.npz")}).exit_code, 0);
+  EXPECT_EQ(folder_.Read("b.npz"), folder_.Read("a.npz"));
+}
+
 // Two squares with one region, or one each, whose numbers are those of markers, too.
 std::string PolyWithRegions(int left, int right) {
   return "6 2 0 0\n1 0 0\n2 1 0\n3 2 0\n4 2 1\n5 1 1\n6 0 1\n7 1\n1 1 2 1\n2 2 3 1\n3 3 4 2\n4 4 5 3\n5 5 6 3\n6 6 1 "
