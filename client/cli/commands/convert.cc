@@ -28,12 +28,12 @@ namespace {
 constexpr char kConvertExamples[] =
     "Examples:\n"
     "  wellspace convert land.msh land.su2\n"
+    "  wellspace convert part.vtu part.inp --order 2\n"
     "  wellspace convert scan.las scan.vtu\n";
 
 struct ConvertCommand {
   std::string input;
-  std::string output;
-  std::string mesh_format;
+  MeshOutput output;
   formats::CloudOptions cloud_options;
   bool no_attributes = false;
   OutputFormat format = OutputFormat::kText;
@@ -44,30 +44,32 @@ struct ConvertCommand {
 absl::Status ConvertCommand::Convert() {
   formats::FilePlan files;
   files.ReadsMesh("IN", input);
-  files.WritesMesh("OUT", output, mesh_format);
+  files.WritesMesh("OUT", output.path, output.format);
   WELLSPACE_RETURN_IF_ERROR(files.Check());
-  WELLSPACE_RETURN_IF_ERROR(CheckMeshOutput(output, mesh_format));
+  WELLSPACE_RETURN_IF_ERROR(output.Check());
   cloud_options.keep_attributes = !no_attributes;
   WELLSPACE_ASSIGN_OR_RETURN(formats::MeshOrCloud read, formats::ReadMeshOrCloud(input, cloud_options));
   if (no_attributes) {
     read.attributes.clear();
   }
   // Formats that hold origins get them only if they are known; .node has markers of vertices without.
-  const std::string by_name = mesh_format.empty() ? output : "." + mesh_format;
+  const std::string by_name = output.format.empty() ? output.path : "." + output.format;
   MarkVertices(by_name.ends_with(".node") || by_name.ends_with(".ele"), read.mesh);
-  const formats::MeshView view = read.View();
+  formats::MeshView view = read.View();
+  view.order = output.order;
   CloudReport report = ReportOf(cloud_options, read.notes, read.skipped);
   PrintNotes(report, format, /*quiet=*/false);
   std::vector<std::string> losses;
-  WELLSPACE_RETURN_IF_ERROR(formats::WriteMesh(output, mesh_format, view, /*stop=*/{}, &losses));
+  WELLSPACE_RETURN_IF_ERROR(formats::WriteMesh(output.path, output.format, view, /*stop=*/{}, &losses));
   PrintNotes({.notes = losses}, format, /*quiet=*/false);
   if (format == OutputFormat::kJson) {
     Json figures = {{"input", input},
-                    {"output", output},
+                    {"output", output.path},
                     {"kind", read.is_mesh ? "mesh" : "cloud"},
                     {"dimension", view.dimension},
                     {"vertices", view.vertex_count()},
-                    {"simplices", view.simplex_count()}};
+                    {"simplices", view.simplex_count()},
+                    {"order", static_cast<int>(output.order)}};
     report.notes.insert(report.notes.end(), losses.begin(), losses.end());
     AddNotes(report, figures);
     PrintJson(figures);
@@ -85,18 +87,19 @@ void AddConvertCommand(CLI::App& app, int& exit_code) {
       "have them; points become vertices of a mesh without simplices");
   convert->footer(absl::StrCat(kCloudsHelp, kMeshesHelp, kConvertExamples, "\n", kExitCodesHelp));
   convert->add_option("IN", command->input, "File of a mesh or of points")->required()->type_name("FILE");
-  convert->add_option("OUT", command->output, "File of the mesh, or - for standard output")
+  convert->add_option("OUT", command->output.path, "File of the mesh, or - for standard output")
       ->required()
       ->type_name("FILE");
-  convert->add_option("--format", command->mesh_format, "Format of OUT; default: by its extension")
+  convert->add_option("--format", command->output.format, "Format of OUT; default: by its extension")
       ->check(CLI::IsMember(formats::MeshFormats()));
+  AddMeshOrder(*convert, command->output.order);
   AddCloudOptions(*convert, command->cloud_options);
   convert->add_flag("--no-attributes", command->no_attributes, "Leave out what points have beside coordinates");
   AddOutput(*convert, command->format);
   convert->callback([command, &exit_code] {
     const Interrupt interrupt(Interrupt::First::kEnd);
     const absl::Status status =
-        command->output == formats::kStandardStream && command->format == OutputFormat::kJson
+        command->output.path == formats::kStandardStream && command->format == OutputFormat::kJson
             ? absl::InvalidArgumentError("--output json, and OUT: only one of them can be standard output")
             : command->Convert();
     exit_code = status.ok() ? kExitOk : ReportError(status, command->format);

@@ -8,12 +8,15 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/formats/mesh_writers.h"
+#include "client/formats/middle_nodes.h"
 #include "client/formats/numpy/npz.h"
 #include "client/formats/numpy/npz_file.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
+
+constexpr uint64_t kValuesAtOnce = 1 << 14;
 
 class NpzWriter final : public MeshWriter {
  public:
@@ -77,14 +80,14 @@ class NpzWriter final : public MeshWriter {
     BeginSimplices();
     BeginFacets();
     file_->Write(facets);
-    facets_ += facets.size() / shape_.dimension;
+    facets_ += facets.size() / shape_.facet_nodes();
     return file_->status();
   }
 
   absl::Status AddSimplices(std::span<const uint32_t> simplices) override {
     BeginSimplices();
     file_->Write(simplices);
-    simplices_ += simplices.size() / (shape_.dimension + 1);
+    simplices_ += simplices.size() / shape_.simplex_nodes();
     return file_->status();
   }
 
@@ -109,6 +112,9 @@ class NpzWriter final : public MeshWriter {
     if (shape_.part != nullptr) {
       WritePart(*shape_.part);
     }
+    if (shape_.middles != nullptr) {
+      WELLSPACE_RETURN_IF_ERROR(WriteMiddles(*shape_.middles));
+    }
     AddNote(file_->ChangesNote());
     WELLSPACE_RETURN_IF_ERROR(file_->status());
     WELLSPACE_RETURN_IF_ERROR(CheckComplete(shape_, {.vertices = vertices_,
@@ -130,13 +136,13 @@ class NpzWriter final : public MeshWriter {
 
   void BeginSimplices() {
     if (!std::exchange(has_simplices_, true)) {
-      file_->Begin<uint32_t>(kNpzSimplices, shape_.simplex_count, shape_.dimension + 1);
+      file_->Begin<uint32_t>(kNpzSimplices, shape_.simplex_count, shape_.simplex_nodes());
     }
   }
 
   void BeginFacets() {
     if (!std::exchange(has_facets_, true)) {
-      file_->Begin<uint32_t>(kNpzFacets, shape_.facet_count(), shape_.dimension);
+      file_->Begin<uint32_t>(kNpzFacets, shape_.facet_count(), shape_.facet_nodes());
     }
   }
 
@@ -168,6 +174,21 @@ class NpzWriter final : public MeshWriter {
     }
     file_->WriteArray(kNpzRegionIds, std::span<const int32_t>(ids));
     file_->WriteTexts(kNpzRegionNames, names);
+  }
+
+  absl::Status WriteMiddles(const MiddleNodes& middles) {
+    file_->Begin<uint32_t>(kNpzMiddleEnds, middles.count(), 2);
+    std::vector<uint32_t> ends;
+    const auto flush = [&] {
+      file_->Write(std::span<const uint32_t>(ends));
+      ends.clear();
+      return file_->status();
+    };
+    WELLSPACE_RETURN_IF_ERROR(middles.ForEachEdge([&](uint32_t low, uint32_t high) {
+      ends.insert(ends.end(), {low, high});
+      return ends.size() < kValuesAtOnce ? absl::OkStatus() : flush();
+    }));
+    return flush();
   }
 
   void WritePart(const PartNumbers& part) {

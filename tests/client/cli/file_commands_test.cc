@@ -100,6 +100,35 @@ TEST_F(FileCommandsTest, ConvertKeepsBoundaryRegionsNamesAndAttributes) {
   EXPECT_THAT(RunWellspace({"convert", Path("none.msh"), Path("d.vtu")}).err, HasSubstr("none.msh"));
 }
 
+// Of the mesher's own files, in one run, the same bytes as of convert.
+TEST_F(FileCommandsTest, ElementsOfSecondOrder) {
+  for (const char* cloud : {kPlane, kSpace}) {
+    for (const std::string extension : {".npz", ".vtu", ".msh", ".inp"}) {
+      SCOPED_TRACE(extension);
+      Mesh(cloud, "first.npz");
+      Mesh(cloud, "mesh" + extension, {"--order", "2"});
+      const RunResult result =
+          RunWellspace({"convert", Path("first.npz"), Path("convert" + extension), "--order", "2"});
+      ASSERT_EQ(result.exit_code, 0) << result.err;
+      EXPECT_EQ(folder_.Read("mesh" + extension), folder_.Read("convert" + extension));
+    }
+  }
+  const RunResult figures =
+      RunWellspace({"convert", Path("first.npz"), Path("a.vtk"), "--order", "2", "--output", "json"});
+  EXPECT_EQ(nlohmann::json::parse(figures.out)["order"], 2) << figures.out;
+  const int files = folder_.FileCount();
+  EXPECT_THAT(MeshFails("cloud.csv", kSpace, 2, {"--order", "3"}),
+              HasSubstr("--order: expected a whole number of at least 1 and at most 2, got \"3\""));
+  for (const char* name : {"a.su2", "a.mesh"}) {
+    const RunResult refused = RunWellspace({"convert", Path("first.npz"), Path(name), "--order", "2"});
+    EXPECT_EQ(refused.exit_code, 2);
+    EXPECT_THAT(refused.err, HasSubstr("has no elements of second order that its readers take; expected one of vtu"));
+    EXPECT_THAT(RunWellspace({"mesh", Path("none.csv"), "-o", Path(name), "--order", "2"}).err,
+                HasSubstr("has no elements of second order"));  // before anything is read
+  }
+  EXPECT_EQ(folder_.FileCount(), files);
+}
+
 // Origins of vertices come back from .npz.
 TEST_F(FileCommandsTest, ConvertKeepsOriginsOfNpz) {
   Mesh(kPlane, "a.npz");

@@ -22,6 +22,7 @@ from ._parameters import Parameters, takes
 from ._plane import PlaneArguments, RegionPolygon, RegionSeed
 from ._progress import Progress, ProgressOption
 from ._retry import CancelToken, RetryPolicy
+from ._second_order import MIDDLE, SecondOrderMesh
 from ._server import LocalServer
 from ._session_info import SessionInfo
 from ._sessions import Session
@@ -120,6 +121,7 @@ def estimate(
 
 __all__ = [
     "CORNER",
+    "MIDDLE",
     "REPAIR",
     "STEINER",
     "CancelToken",
@@ -149,6 +151,7 @@ __all__ = [
     "RegionPolygon",
     "RegionSeed",
     "RetryPolicy",
+    "SecondOrderMesh",
     "ServerInfo",
     "ServerNotInstalledError",
     "Session",

@@ -25,8 +25,8 @@ def find() -> str | None:
     return find_program(_NAME, _VARIABLE)
 
 
-def convert(source: str | os.PathLike[str], target: str | os.PathLike[str]) -> None:
-    """Writes the mesh of a file to another one, in the formats that their extensions say.
+def convert(source: str | os.PathLike[str], target: str | os.PathLike[str], order: int = 1) -> None:
+    """Writes the mesh of a file to another one, in the formats that their extensions say, with elements of `order`.
 
     Raises
     ------
@@ -47,6 +47,8 @@ def convert(source: str | os.PathLike[str], target: str | os.PathLike[str]) -> N
     if not folder.is_dir():
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), os.fspath(target))
     command = [tool, "convert", os.path.abspath(source), os.path.abspath(target), "--output", "json"]
+    if order != 1:
+        command += ["--order", str(order)]
     done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         message = _message_of(done.stderr) or f"{_NAME} ended with {done.returncode}"
