@@ -6,6 +6,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "client/formats/read_cloud.h"
 #include "client/formats/read_mesh.h"
@@ -137,6 +139,38 @@ TEST_F(FileCommandsTest, ConvertKeepsOriginsOfNpz) {
   EXPECT_EQ(folder_.Read("b.vtu"), folder_.Read("a.vtu"));
   ASSERT_EQ(RunWellspace({"convert", Path("b.vtu"), Path("b.npz")}).exit_code, 0);
   EXPECT_EQ(folder_.Read("b.npz"), folder_.Read("a.npz"));
+}
+
+// What Python makes of the arrays is the business of read_test.py.
+TEST_F(FileCommandsTest, ConvertMakesArraysOfDomainsAndSurfaces) {
+  folder_.Write("lake.wkt", "POLYGON ((0 0, 3 0, 1 2, 0 0))");
+  folder_.Write("part.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 1\n3 0 1 2\n");
+  RunResult result = RunWellspace({"convert", Path("lake.wkt"), Path("lake.npz"), "--output", "json"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  nlohmann::json figures = nlohmann::json::parse(result.out);
+  EXPECT_EQ(figures["kind"], "domain");
+  EXPECT_EQ(figures["segments"], 3);
+  EXPECT_EQ(formats::ReadCloud(Path("lake.npz"))->size(), 3);
+  result = RunWellspace({"convert", Path("part.off"), Path("part.npz"), "--triangles", "--output", "json"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  figures = nlohmann::json::parse(result.out);
+  EXPECT_EQ(figures["kind"], "surface");
+  EXPECT_EQ(figures["triangles"], 1);
+  const int files = folder_.FileCount();
+  for (const auto& [arguments, message] :
+       {std::pair(std::vector<std::string>{"lake.wkt", "lake.vtu"},
+                  "IN is a domain, which .npz has as arrays; expected a file of npz, or `wellspace mesh`"),
+        {{"lake.wkt", "other.npz", "--order", "2"}, "--order is for meshes, and IN is a domain"},
+        {{"part.off", "part.vtu", "--triangles"}, "IN is a surface, which .npz has as arrays"},
+        {{"part.off", "other.npz", "--triangles", "--skip-invalid"}, "--skip-invalid are for points"},
+        {{"part.off", "other.npz", "--faces", "holes"}, "--faces"}}) {
+    std::vector<std::string> all = {"convert", Path(arguments[0]), Path(arguments[1])};
+    all.insert(all.end(), arguments.begin() + 2, arguments.end());
+    const RunResult refused = RunWellspace(all);
+    EXPECT_EQ(refused.exit_code, 2);
+    EXPECT_THAT(refused.err, HasSubstr(message));
+  }
+  EXPECT_EQ(folder_.FileCount(), files);
 }
 
 // Two squares with one region, or one each, whose numbers are those of markers, too.

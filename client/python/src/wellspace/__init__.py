@@ -21,6 +21,7 @@ from ._operations import Operation
 from ._parameters import Parameters, takes
 from ._plane import PlaneArguments, RegionPolygon, RegionSeed
 from ._progress import Progress, ProgressOption
+from ._read import CloudFile, DomainFile, read
 from ._retry import CancelToken, RetryPolicy
 from ._second_order import MIDDLE, SecondOrderMesh
 from ._server import LocalServer
@@ -129,11 +130,13 @@ __all__ = [
     "Cell",
     "Cells",
     "Client",
+    "CloudFile",
     "ConflictError",
     "Credentials",
     "CredentialsError",
     "DamagedAnswerError",
     "DeadlineError",
+    "DomainFile",
     "DualCells",
     "Error",
     "Estimate",
@@ -165,6 +168,7 @@ __all__ = [
     "errors",
     "estimate",
     "mesh",
+    "read",
     "read_surface",
     "statistics",
 ]

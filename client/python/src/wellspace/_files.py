@@ -119,11 +119,20 @@ def load(path: str | os.PathLike[str]) -> dict[str, Any]:
             arrays = pathlib.Path(folder) / "mesh.npz"
             _tool.convert(path, arrays)
             return load(arrays)
+    return _attributes(arrays_of(path), path)
+
+
+def arrays_of(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """All arrays of a .npz, by their names."""
     try:
         with np.load(path, allow_pickle=False) as archive:
-            found = {name: archive[name] for name in archive.files}
+            return {name: archive[name] for name in archive.files}
     except (zipfile.BadZipFile, ValueError, AttributeError) as error:
         raise InvalidArgumentError(f"{path}: expected .npz, with arrays of numbers: {error}", field="path") from error
+
+
+def _attributes(found: dict[str, Any], path: str | os.PathLike[str]) -> dict[str, Any]:
+    """The attributes of the mesh of these arrays, which are checked."""
     points, simplices = _checked(found, path)
     d, kind = points.shape[1], np.int32 if len(points) <= 2**31 else np.int64
     none = np.empty(0, np.int32)
