@@ -60,14 +60,15 @@ void MarkVertices(bool always, formats::Mesh& mesh) {
   }
 }
 
-absl::Status CheckMeshOutput(const std::string& path, const std::string& format, int dimension, bool may_have_weights) {
+absl::Status CheckMeshOutput(const std::string& path, const std::string& format, int dimension, bool may_have_weights,
+                             formats::MeshOrder order) {
   if (format.empty() && IsPicture(path)) {
     const std::string mesh = MeshPathFor(path);
     return absl::InvalidArgumentError(absl::StrCat("cannot write ", path, ": this is a picture, not a mesh; write ",
                                                    mesh, ", of which `wellspace render ", mesh, " -o ", path,
                                                    "` makes a picture"));
   }
-  return formats::CheckMeshOutput(path, format, dimension, may_have_weights);
+  return formats::CheckMeshOutput(path, format, dimension, may_have_weights, order);
 }
 
 }  // namespace wellspace::cli

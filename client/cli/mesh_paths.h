@@ -23,7 +23,7 @@ void MarkVertices(bool always, formats::Mesh& mesh);
 //
 // Errors:     of a picture that it is one, and how a mesh is drawn.
 absl::Status CheckMeshOutput(const std::string& path, const std::string& format, int dimension = 0,
-                             bool may_have_weights = false);
+                             bool may_have_weights = false, formats::MeshOrder order = formats::MeshOrder::kFirst);
 
 }  // namespace wellspace::cli
 

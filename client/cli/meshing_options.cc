@@ -3,6 +3,8 @@
 #include <iostream>
 
 #include "client/cli/helpful_threads.h"
+#include "client/cli/mesh_paths.h"
+#include "client/cli/options.h"
 #include "client/formats/domain/read_planar_domain.h"
 #include "client/formats/io/input_file.h"
 #include "client/formats/io/line_reader.h"
@@ -37,12 +39,27 @@ std::vector<std::string> InputFormats() {
   return formats;
 }
 
-void AddMeshOutput(CLI::App& command, std::string& path, std::string& format, bool& no_boundary) {
-  command.add_option("-o,--out", path, "File of the mesh, or - for standard output")->required()->type_name("FILE");
-  command.add_option("--format", format, "Format of the mesh; default: by the extension of its file")
+absl::Status MeshOutput::Check(int dimension, bool may_have_weights) const {
+  return cli::CheckMeshOutput(path, format, dimension, may_have_weights, order);
+}
+
+void AddMeshOrder(CLI::App& command, formats::MeshOrder& order) {
+  AddCount(
+      command, "--order", [&order](uint64_t value) { order = static_cast<formats::MeshOrder>(value); },
+      "Order of the elements: 2 gives them a node at the middle of each edge, behind the vertices, for triangles and "
+      "tetrahedra of .vtu, .vtkhdf, .vtk, .xdmf, .msh, .inp, .npz and .ele; the edges stay straight; default: 1",
+      1, 2);
+}
+
+void AddMeshOutput(CLI::App& command, MeshOutput& output) {
+  command.add_option("-o,--out", output.path, "File of the mesh, or - for standard output")
+      ->required()
+      ->type_name("FILE");
+  command.add_option("--format", output.format, "Format of the mesh; default: by the extension of its file")
       ->check(CLI::IsMember(formats::MeshFormats()));
+  AddMeshOrder(command, output.order);
   command.add_flag(
-      "--no-boundary", no_boundary,
+      "--no-boundary", output.no_boundary,
       "Leave out the boundary (facets of the faces xmin, xmax, ymin, ... with tags 1, 2, 3, ...), regions and "
       "origins of vertices");
 }

@@ -22,6 +22,7 @@
 #include "client/client.h"
 #include "client/formats/cloud.h"
 #include "client/formats/file_plan.h"
+#include "client/formats/mesh_order.h"
 
 namespace wellspace::cli {
 
@@ -34,8 +35,22 @@ extern const char kMeshesHelp[];
 // The formats of --input-format beside those of clouds: of domains and of surfaces.
 std::vector<std::string> InputFormats();
 
-// -o,--out, --format and --no-boundary, of a mesh.
-void AddMeshOutput(CLI::App& command, std::string& path, std::string& format, bool& no_boundary);
+// A file that a mesh goes to, and what of the mesh.
+struct MeshOutput {
+  std::string path;
+  std::string format;
+  formats::MeshOrder order = formats::MeshOrder::kFirst;
+  bool no_boundary = false;
+
+  // Tells early whether a mesh cannot go there; see cli::CheckMeshOutput.
+  absl::Status Check(int dimension = 0, bool may_have_weights = false) const;
+};
+
+// --order, of a mesh.
+void AddMeshOrder(CLI::App& command, formats::MeshOrder& order);
+
+// -o,--out, --format, --order and --no-boundary, of a mesh.
+void AddMeshOutput(CLI::App& command, MeshOutput& output);
 
 // --no-attributes, of a mesh of a file of points.
 void AddNoAttributes(CLI::App& command, bool& no_attributes);

@@ -44,6 +44,7 @@ absl::Status MeshFile::Begin(const MeshHeader& header) {
       .low = header.domain_low,
       .high = header.domain_high,
       .ridge_count = header.ridge_count,
+      .order = order_,
   };
   for (const BoundaryPart& part : header_.boundary) {
     shape.boundary.push_back({part.tag, part.name, part.facet_count});

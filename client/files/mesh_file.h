@@ -47,6 +47,9 @@ class MeshFile final : public MeshSink {
   absl::Status AddRidges(std::span<const uint32_t> ridges) override { return writer_->AddRidges(ridges); }
   absl::Status Finish() override { return writer_->Commit(); }
 
+  // The file gets elements of this order; of the second the mesh is kept until its end. To be called before Begin.
+  void SetOrder(formats::MeshOrder order) { order_ = order; }
+
   // The file gets neither boundary nor regions nor origins of vertices. To be called before Begin.
   void LeaveOutBoundary() { has_boundary_ = false; }
 
@@ -80,6 +83,7 @@ class MeshFile final : public MeshSink {
   const std::stop_token stop_;
   MeshHeader header_;
   std::unique_ptr<formats::MeshWriter> writer_;
+  formats::MeshOrder order_ = formats::MeshOrder::kFirst;
   bool has_boundary_ = true;
   std::map<int32_t, std::string> part_names_;
   std::span<const formats::PointAttribute> attributes_;

@@ -9,9 +9,12 @@
 #include <vector>
 
 #include "client/formats/attributes.h"
+#include "client/formats/mesh_order.h"
 #include "client/formats/mesh_part.h"
 
 namespace wellspace::formats {
+
+class MiddleNodes;
 
 // "triangles", "tetrahedra" or, in higher dimensions, "simplices".
 inline const char* SimplexName(int dimension) {
@@ -22,10 +25,11 @@ inline const char* SimplexName(int dimension) {
 inline constexpr uint32_t kSteinerOrigin = 0xffff'ffff;  // the refinement
 inline constexpr uint32_t kRepairOrigin = 0xffff'fffe;   // the repair of slivers
 inline constexpr uint32_t kCornerOrigin = 0xffff'fffd;   // it is a corner of the box
+inline constexpr uint32_t kMiddleOrigin = 0xffff'fffc;   // it is the middle of an edge, in a file of second order
 
-// An origin as files have it: -1, -2 and -3 in the place of these three.
+// An origin as files have it: -1, -2, -3 and -4 in the place of these four.
 constexpr int64_t SignedOrigin(uint32_t origin) {
-  return origin >= kCornerOrigin ? int64_t{origin} - (int64_t{1} << 32) : int64_t{origin};
+  return origin >= kMiddleOrigin ? int64_t{origin} - (int64_t{1} << 32) : int64_t{origin};
 }
 
 // Facets of the boundary with a tag in common.
@@ -54,7 +58,7 @@ inline uint64_t CountFacets(std::span<const BoundaryPart> parts) {
   return count;
 }
 
-// The sizes of the arrays of a mesh.
+// The sizes of the arrays of a mesh. Rows that come to a writer are those of first order, whatever the order.
 struct MeshShape {
   int dimension = 0;
   uint64_t vertex_count = 0;
@@ -70,8 +74,14 @@ struct MeshShape {
   uint64_t ridge_count = 0;               // edges along the creases of a surface
   std::vector<std::string> attributes{};  // of vertices: names as of NamesToWrite
   const PartNumbers* part = nullptr;      // of a part of a larger mesh; outlives the writer; null: it is whole
+  MeshOrder order = MeshOrder::kFirst;    // of elements of the file; kSecond: in 2-D and 3-D
+  // For writers of formats alone, whose rows of second order have all nodes, those at the middles of edges behind the
+  // vertices; outlives the writer.
+  const MiddleNodes* middles = nullptr;
 
   uint64_t facet_count() const { return CountFacets(boundary); }
+  int simplex_nodes() const { return NodesOf(dimension + 1, order); }
+  int facet_nodes() const { return NodesOf(dimension, order); }
 };
 
 // Simplices: triangles in 2-D, tetrahedra in 3-D.
@@ -91,6 +101,7 @@ struct MeshView {
   std::span<const Region> regions{};
   std::span<const PointAttribute> attributes{};  // of vertices
   const PartNumbers* part = nullptr;             // see MeshShape
+  MeshOrder order = MeshOrder::kFirst;           // see MeshShape
 
   uint64_t vertex_count() const { return dimension == 0 ? 0 : points.size() / dimension; }
   uint64_t simplex_count() const { return dimension == 0 ? 0 : simplices.size() / (dimension + 1); }
@@ -106,7 +117,8 @@ struct MeshView {
                     .regions = {regions.begin(), regions.end()},
                     .ridge_count = ridges.size() / 2,
                     .attributes = NamesToWrite(attributes),
-                    .part = part};
+                    .part = part,
+                    .order = order};
     for (size_t i = 0; i < points.size() && !boundary.empty(); ++i) {
       const size_t axis = i % dimension;
       if (i < static_cast<size_t>(dimension)) {

@@ -58,6 +58,9 @@ absl::StatusOr<MeshOrCloud> ReadMeshOrCloud(const std::string& path, const Cloud
       read.notes = read.mesh.notes;
       if (HasPointData(mesh_format)) {
         TakePointData(path, read);
+      } else if (const std::vector<uint32_t>& origins = read.mesh.vertex_origins; !origins.empty()) {
+        const auto is_added = [](uint32_t origin) { return origin >= kCornerOrigin; };
+        read.input_vertices = std::find_if(origins.begin(), origins.end(), is_added) - origins.begin();
       }
       return read;
     }

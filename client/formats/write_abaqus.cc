@@ -24,7 +24,7 @@ namespace {
 
 constexpr size_t kAbaqusNumberWidth = 20;
 
-// The corners of the faces that Abaqus calls S1, S2, ... of a triangle (CPS3) and a tetrahedron (C3D4).
+// The corners of the faces that Abaqus calls S1, S2, ... of a triangle (CPS3, CPS6) and a tetrahedron (C3D4, C3D10).
 constexpr uint8_t kAbaqusTriangleFaces[][2] = {{0, 1}, {1, 2}, {2, 0}};
 constexpr uint8_t kAbaqusTetrahedronFaces[][3] = {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}};
 
@@ -117,12 +117,13 @@ class AbaqusWriter final : public MeshWriter {
   absl::Status AddSimplices(std::span<const uint32_t> simplices) override {
     BeginSimplices();
     const size_t corners = shape_.dimension + 1;
-    for (; !simplices.empty() && output_.status().ok(); simplices = simplices.subspan(corners)) {
+    const size_t nodes = shape_.simplex_nodes();
+    for (; !simplices.empty() && output_.status().ok(); simplices = simplices.subspan(nodes)) {
       line_.clear();
       AppendNumber(++simplices_, line_);
-      for (const uint32_t corner : simplices.first(corners)) {
+      for (const uint32_t node : simplices.first(nodes)) {
         line_ += ", ";
-        AppendNumber(uint64_t{corner} + 1, line_);
+        AppendNumber(uint64_t{node} + 1, line_);
       }
       line_ += '\n';
       output_.Write(line_);
@@ -144,7 +145,7 @@ class AbaqusWriter final : public MeshWriter {
                                                      .weights = 0,
                                                      .simplex_regions = regions_.count(),
                                                      .simplices = simplices_,
-                                                     .facets = facets_.size() / shape_.dimension}));
+                                                     .facets = facets_.size() / shape_.facet_nodes()}));
     if (shape_.input_vertices > 0) {
       output_.Write(absl::StrCat("*NSET, NSET=", set_labels_.Take("input", "", 0), ", GENERATE\n1, ",
                                  shape_.input_vertices, ", 1\n"));
@@ -174,7 +175,9 @@ class AbaqusWriter final : public MeshWriter {
     if (std::exchange(has_simplices_, true)) {
       return;
     }
-    output_.Write(shape_.dimension == 2 ? "*ELEMENT, TYPE=CPS3" : "*ELEMENT, TYPE=C3D4");
+    const bool is_first = shape_.order == MeshOrder::kFirst;
+    output_.Write(absl::StrCat("*ELEMENT, TYPE=",
+                               shape_.dimension == 2 ? (is_first ? "CPS3" : "CPS6") : (is_first ? "C3D4" : "C3D10")));
     if (!shape_.has_simplex_regions) {
       const Region region = shape_.regions.empty() ? Region{.id = 1, .name = "domain"} : shape_.regions[0];
       output_.Write(absl::StrCat(", ELSET=", region_labels_.Take(region.name, "region", region.id)));
@@ -232,10 +235,11 @@ class AbaqusWriter final : public MeshWriter {
   // Of every facet its side; of one between two simplices that of the first.
   std::vector<Side> FindSides() const {
     const size_t corners = shape_.dimension;
+    const size_t nodes = shape_.facet_nodes();
     std::vector<std::pair<FacetKey, size_t>> keys;
-    for (size_t i = 0; i * corners < facets_.size(); ++i) {
+    for (size_t i = 0; i * nodes < facets_.size(); ++i) {
       FacetKey key = kAbaqusNoFacet;
-      std::copy_n(facets_.begin() + i * corners, corners, key.begin());
+      std::copy_n(facets_.begin() + i * nodes, corners, key.begin());
       std::sort(key.begin(), key.end());
       keys.emplace_back(key, i);
     }
@@ -289,8 +293,8 @@ class AbaqusWriter final : public MeshWriter {
         continue;
       }
       const std::string label = set_labels_.Take(part.name, "boundary", part.tag);
-      std::vector<uint32_t> vertices(facets_.begin() + facet * shape_.dimension,
-                                     facets_.begin() + end * shape_.dimension);
+      std::vector<uint32_t> vertices(facets_.begin() + facet * shape_.facet_nodes(),
+                                     facets_.begin() + end * shape_.facet_nodes());
       std::sort(vertices.begin(), vertices.end());
       vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
       output_.Write(absl::StrCat("*NSET, NSET=", label, "\n"));

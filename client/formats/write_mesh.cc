@@ -14,6 +14,7 @@
 #include "client/formats/io/file_error.h"
 #include "client/formats/io/input_file.h"
 #include "client/formats/io/line_reader.h"
+#include "client/formats/mesh_rows.h"
 #include "client/formats/mesh_writers.h"
 #include "client/formats/registry.h"
 #include "client/formats/tetgen/tetgen.h"
@@ -22,86 +23,83 @@
 namespace wellspace::formats {
 namespace {
 
+// What a format has a place for beside points, simplices and facets.
+enum PlaceFor : uint32_t {
+  kForWeights = 1,
+  kForAttributes = 2,
+  kForRegions = 4,
+  kForParts = 8,
+  kForRidges = 16,
+  kForSecondOrder = 32,
+};
+
 struct WriterKind {
-  absl::StatusOr<std::unique_ptr<MeshWriter>> (*create)(const std::string&, const MeshShape&, std::stop_token);
+  CreateWriter create;
+  uint32_t places = 0;
   int max_dimension = 3;
   // Why it cannot go to a pipe or a device; null: it can.
   const char* needs_file = nullptr;
   // All files that a mesh of this name may be; null: that one.
   std::vector<std::string> (*files)(const std::string& path) = nullptr;
-  bool has_weights = false;
-  bool has_attributes = false;
-  bool has_regions = false;
-  bool has_parts = false;
-  bool has_ridges = false;
+
+  bool HasPlace(PlaceFor place) const { return (places & place) != 0; }
 };
+
+constexpr uint32_t kForDataOfVtk = kForWeights | kForAttributes | kForRegions | kForSecondOrder;
+constexpr uint32_t kForDataOfMsh = kForWeights | kForRegions | kForSecondOrder;
 
 std::span<const Format<WriterKind>> Writers() {
   static const std::vector<Format<WriterKind>> writers = {
-      {.name = "vtu",
-       .extensions = {".vtu"},
-       .handler =
-           {.create = CreateVtu, .has_weights = true, .has_attributes = true, .has_regions = true, .has_parts = true}},
+      {.name = "vtu", .extensions = {".vtu"}, .handler = {.create = CreateVtu, .places = kForDataOfVtk | kForParts}},
       {.name = "vtkhdf",
        .extensions = {".vtkhdf", ".hdf"},
        .handler = {.create = CreateVtkHdf,
-                   .needs_file = "vtkhdf is a file of HDF5, completed from its start",
-                   .has_weights = true,
-                   .has_attributes = true,
-                   .has_regions = true}},
+                   .places = kForDataOfVtk,
+                   .needs_file = "vtkhdf is a file of HDF5, completed from its start"}},
       {.name = "npz",
        .extensions = {".npz"},
        .handler = {.create = CreateNpz,
+                   .places = kForDataOfVtk | kForParts | kForRidges,
                    .max_dimension = kMaxDimension,
-                   .needs_file = "npz is a zip archive, completed from its start",
-                   .has_weights = true,
-                   .has_attributes = true,
-                   .has_regions = true,
-                   .has_parts = true,
-                   .has_ridges = true}},
-      {.name = "msh41",
-       .extensions = {".msh"},
-       .handler = {.create = CreateMsh41, .has_weights = true, .has_regions = true}},
-      {.name = "msh22", .extensions = {}, .handler = {.create = CreateMsh22, .has_weights = true, .has_regions = true}},
+                   .needs_file = "npz is a zip archive, completed from its start"}},
+      {.name = "msh41", .extensions = {".msh"}, .handler = {.create = CreateMsh41, .places = kForDataOfMsh}},
+      {.name = "msh22", .extensions = {}, .handler = {.create = CreateMsh22, .places = kForDataOfMsh}},
       {.name = "medit",
        .extensions = {".mesh"},
-       .handler = {.create = CreateMedit, .has_regions = true, .has_ridges = true}},
+       .handler = {.create = CreateMedit, .places = kForRegions | kForRidges}},
       {.name = "node",
        .extensions = {".node", ".ele"},
        .handler = {.create = CreateNodeAndEle,
+                   .places = kForDataOfMsh,
                    .max_dimension = kMaxDimension,
                    .needs_file = "node is a pair of files",
-                   .files = TetgenFilesOf,
-                   .has_weights = true,
-                   .has_regions = true}},
-      {.name = "vtk",
-       .extensions = {".vtk"},
-       .handler = {.create = CreateVtk, .has_weights = true, .has_attributes = true, .has_regions = true}},
+                   .files = TetgenFilesOf}},
+      {.name = "vtk", .extensions = {".vtk"}, .handler = {.create = CreateVtk, .places = kForDataOfVtk}},
       {.name = "xdmf",
        .extensions = {".xdmf"},
        .handler = {.create = CreateXdmf,
+                   .places = kForDataOfVtk,
                    .needs_file = "xdmf has its arrays in a file of HDF5 beside it",
-                   .files = XdmfFilesOf,
-                   .has_weights = true,
-                   .has_attributes = true,
-                   .has_regions = true}},
+                   .files = XdmfFilesOf}},
       {.name = "su2", .extensions = {".su2"}, .handler = {.create = CreateSu2}},
-      {.name = "abaqus", .extensions = {".inp"}, .handler = {.create = CreateAbaqus, .has_regions = true}},
+      {.name = "abaqus",
+       .extensions = {".inp"},
+       .handler = {.create = CreateAbaqus, .places = kForRegions | kForSecondOrder}},
       {.name = "adcirc",
        .extensions = {".14", ".grd", ".gr3"},
-       .handler = {.create = CreateAdcirc, .max_dimension = 2, .has_attributes = true}},
+       .handler = {.create = CreateAdcirc, .places = kForAttributes, .max_dimension = 2}},
       {.name = "2dm",
        .extensions = {".2dm"},
-       .handler = {.create = Create2dm, .max_dimension = 2, .has_attributes = true, .has_regions = true}},
+       .handler = {.create = Create2dm, .places = kForAttributes | kForRegions, .max_dimension = 2}},
   };
   return writers;
 }
 
 // The names of the formats that have a place for something, such as weights.
-std::string FormatsWith(bool WriterKind::*place) {
+std::string FormatsWith(PlaceFor place) {
   std::vector<std::string> names;
   for (const Format<WriterKind>& writer : Writers()) {
-    if (writer.handler.*place) {
+    if (writer.handler.HasPlace(place)) {
       names.push_back(writer.name);
     }
   }
@@ -114,26 +112,42 @@ std::string Joined(const std::vector<std::string>& names) {
                       names.size() > kShown ? ", ..." : "");
 }
 
-// Notes the arrays that `kind` has no place for. A mesh without a word of regions is "domain" of the id 1 everywhere.
-void NoteLosses(const WriterKind& kind, const MeshShape& shape, MeshWriter& writer) {
-  if (!kind.has_attributes && !shape.attributes.empty()) {
-    writer.AddNote(absl::StrCat("the format has no place for attributes of vertices, which are left out: ",
-                                Joined(shape.attributes)));
+// Notes on the arrays that `kind` has no place for. A mesh without a word of regions is "domain" of the id 1.
+std::vector<std::string> LossesOf(const WriterKind& kind, const MeshShape& shape) {
+  std::vector<std::string> notes;
+  if (!kind.HasPlace(kForAttributes) && !shape.attributes.empty()) {
+    notes.push_back(absl::StrCat("the format has no place for attributes of vertices, which are left out: ",
+                                 Joined(shape.attributes)));
   }
   const bool tells_regions =
       shape.regions.size() > 1 || (shape.regions.size() == 1 && shape.regions[0] != Region{.id = 1, .name = "domain"});
-  if (!kind.has_regions && tells_regions) {
+  if (!kind.HasPlace(kForRegions) && tells_regions) {
     std::vector<std::string> names;
     for (const Region& region : shape.regions) {
       names.push_back(region.name.empty() ? absl::StrCat(region.id) : region.name);
     }
-    writer.AddNote(absl::StrCat("the format has no place for regions, which are left out: ", Joined(names)));
+    notes.push_back(absl::StrCat("the format has no place for regions, which are left out: ", Joined(names)));
   }
+  return notes;
+}
+
+absl::Status CheckOrder(const WriterKind& writer, const std::string& name, const std::string& path, int dimension) {
+  if (!writer.HasPlace(kForSecondOrder)) {
+    return absl::InvalidArgumentError(absl::StrCat("cannot write ", path, ": ", name,
+                                                   " has no elements of second order that its readers take; expected "
+                                                   "one of ",
+                                                   FormatsWith(kForSecondOrder), ", or order 1"));
+  }
+  return dimension <= 3
+             ? absl::OkStatus()
+             : absl::InvalidArgumentError(absl::StrCat(
+                   "cannot write ", path, ": elements of second order are triangles and tetrahedra, and this mesh is ",
+                   dimension, "-D; expected order 1"));
 }
 
 // `dimension` is that of the mesh, or 0 when it is not known.
 absl::StatusOr<WriterKind> FindWriter(const std::string& path, const std::string& format, int dimension,
-                                      bool has_weights) {
+                                      bool has_weights, MeshOrder order = MeshOrder::kFirst) {
   const bool is_stream = path == kStandardStream;
   const auto row = FindFormat(Writers(), path, format.empty() && is_stream ? "vtu" : format);
   if (!row.ok()) {
@@ -149,10 +163,13 @@ absl::StatusOr<WriterKind> FindWriter(const std::string& path, const std::string
                                                    writer.max_dimension, "-D, and this one is ", dimension,
                                                    "-D; expected npz, a file of numpy"));
   }
-  if (has_weights && !writer.has_weights) {
+  if (has_weights && !writer.HasPlace(kForWeights)) {
     return absl::InvalidArgumentError(absl::StrCat("cannot write ", path, ": ", (*row)->name,
                                                    " has no place for the weights of a mesh; expected one of ",
-                                                   FormatsWith(&WriterKind::has_weights)));
+                                                   FormatsWith(kForWeights)));
+  }
+  if (order == MeshOrder::kSecond) {
+    WELLSPACE_RETURN_IF_ERROR(CheckOrder(writer, (*row)->name, path, dimension));
   }
   return writer;
 }
@@ -181,7 +198,7 @@ std::string ExtensionOfMesh(const std::string& format) {
 
 bool HasPlaceForAttributes(const std::string& path, const std::string& format) {
   const absl::StatusOr<WriterKind> writer = FindWriter(path, format, /*dimension=*/0, /*has_weights=*/false);
-  return writer.ok() && writer->has_attributes;
+  return writer.ok() && writer->HasPlace(kForAttributes);
 }
 
 std::vector<std::string> FilesOfMeshWritten(const std::string& path, const std::string& format) {
@@ -189,8 +206,9 @@ std::vector<std::string> FilesOfMeshWritten(const std::string& path, const std::
   return writer.ok() && writer->files != nullptr ? writer->files(path) : std::vector<std::string>{path};
 }
 
-absl::Status CheckMeshOutput(const std::string& path, const std::string& format, int dimension, bool may_have_weights) {
-  WELLSPACE_ASSIGN_OR_RETURN(const WriterKind writer, FindWriter(path, format, dimension, may_have_weights));
+absl::Status CheckMeshOutput(const std::string& path, const std::string& format, int dimension, bool may_have_weights,
+                             MeshOrder order) {
+  WELLSPACE_ASSIGN_OR_RETURN(const WriterKind writer, FindWriter(path, format, dimension, may_have_weights, order));
   if (path == kStandardStream) {
     return absl::OkStatus();
   }
@@ -237,64 +255,74 @@ absl::Status CheckComplete(const MeshShape& shape, const RowCounts& rows) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::unique_ptr<MeshWriter>> CreateMesh(const std::string& path, const std::string& format,
-                                                       const MeshShape& shape, std::stop_token stop) {
-  WELLSPACE_ASSIGN_OR_RETURN(const WriterKind writer, FindWriter(path, format, shape.dimension, shape.has_weights));
-  if (shape.part != nullptr && !writer.has_parts) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("cannot write ", path, ": the format has no place for the numbers of a part; expected one of ",
-                     FormatsWith(&WriterKind::has_parts)));
-  }
+namespace {
+
+// What the format of `writer` has a place for.
+MeshShape HeldShape(const WriterKind& writer, const MeshShape& shape) {
   MeshShape held = shape;
-  if (!writer.has_attributes) {
+  if (!writer.HasPlace(kForAttributes)) {
     held.attributes.clear();
   }
-  if (!writer.has_ridges) {
+  if (!writer.HasPlace(kForRidges)) {
     held.ridge_count = 0;
   }
-  WELLSPACE_ASSIGN_OR_RETURN(std::unique_ptr<MeshWriter> created, writer.create(path, held, std::move(stop)));
-  NoteLosses(writer, shape, *created);
+  return held;
+}
+
+absl::StatusOr<WriterKind> FindWriterFor(const std::string& path, const std::string& format, const MeshShape& shape) {
+  WELLSPACE_ASSIGN_OR_RETURN(const WriterKind writer,
+                             FindWriter(path, format, shape.dimension, shape.has_weights, shape.order));
+  if (shape.part != nullptr && !writer.HasPlace(kForParts)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("cannot write ", path, ": the format has no place for the numbers of a part; expected one of ",
+                     FormatsWith(kForParts)));
+  }
+  if (shape.part != nullptr && shape.order == MeshOrder::kSecond) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("cannot write ", path, ": parts of a mesh have elements of first order; expected order 1"));
+  }
+  return writer;
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<MeshWriter>> CreateMesh(const std::string& path, const std::string& format,
+                                                       const MeshShape& shape, std::stop_token stop) {
+  WELLSPACE_ASSIGN_OR_RETURN(const WriterKind writer, FindWriterFor(path, format, shape));
+  const MeshShape held = HeldShape(writer, shape);
+  std::unique_ptr<MeshWriter> created;
+  if (shape.order == MeshOrder::kSecond) {
+    created = CreateSecondOrder(path, held, writer.create, std::move(stop));
+  } else {
+    WELLSPACE_ASSIGN_OR_RETURN(created, writer.create(path, held, std::move(stop)));
+  }
+  for (std::string& note : LossesOf(writer, shape)) {
+    created->AddNote(std::move(note));
+  }
   return created;
 }
 
 absl::Status WriteMesh(const std::string& path, const std::string& format, const MeshView& mesh, std::stop_token stop,
                        std::vector<std::string>* notes) {
-  WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<MeshWriter> writer,
-                             CreateMesh(path, format, mesh.Shape(), std::move(stop)));
-  MeshWriter& rows = *writer;
-  const bool has_marks = !mesh.vertex_tags.empty();
-  absl::Status status = rows.AddPoints(mesh.points);
-  if (status.ok() && !mesh.weights.empty()) {
-    status = rows.AddWeights(mesh.weights);
+  std::vector<std::string> of_writer;
+  if (mesh.order == MeshOrder::kSecond) {
+    const MeshShape shape = mesh.Shape();
+    WELLSPACE_ASSIGN_OR_RETURN(const WriterKind writer, FindWriterFor(path, format, shape));
+    MeshView held = mesh;
+    held.attributes = writer.HasPlace(kForAttributes) ? mesh.attributes : std::span<const PointAttribute>();
+    held.ridges = writer.HasPlace(kForRidges) ? mesh.ridges : std::span<const uint32_t>();
+    of_writer = LossesOf(writer, shape);
+    WELLSPACE_RETURN_IF_ERROR(WriteSecondOrder(held, HeldShape(writer, shape), path, writer.create, stop, of_writer));
+  } else {
+    WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<MeshWriter> writer,
+                               CreateMesh(path, format, mesh.Shape(), std::move(stop)));
+    WELLSPACE_RETURN_IF_ERROR(WriteRows(mesh, *writer));
+    of_writer = writer->notes();
   }
-  if (status.ok() && has_marks) {
-    status = rows.AddVertexOrigins(mesh.vertex_origins);
+  if (notes != nullptr) {
+    notes->insert(notes->end(), of_writer.begin(), of_writer.end());
   }
-  if (status.ok() && has_marks) {
-    status = rows.AddVertexTags(mesh.vertex_tags);
-  }
-  for (size_t i = 0; i < mesh.attributes.size() && status.ok(); ++i) {
-    status = rows.AddAttribute(i, mesh.attributes[i].values);
-  }
-  if (status.ok() && !mesh.simplex_regions.empty()) {
-    status = rows.AddSimplexRegions(mesh.simplex_regions);
-  }
-  if (status.ok()) {
-    status = rows.AddSimplices(mesh.simplices);
-  }
-  if (status.ok() && !mesh.facets.empty()) {
-    status = rows.AddFacets(mesh.facets);
-  }
-  if (status.ok() && !mesh.ridges.empty()) {
-    status = rows.AddRidges(mesh.ridges);
-  }
-  if (status.ok()) {
-    status = rows.Commit();
-  }
-  if (status.ok() && notes != nullptr) {
-    notes->insert(notes->end(), rows.notes().begin(), rows.notes().end());
-  }
-  return status;
+  return absl::OkStatus();
 }
 
 }  // namespace wellspace::formats

@@ -60,6 +60,14 @@
 //
 // Edges along the creases of a surface are `ridges` of npz, and Edges that Ridges names of medit.
 //
+// Of second order (MeshOrder) vertices are followed by the nodes at the middles of edges, ordered by the ends of these,
+// the lower one first; data of vertices tell the mean of the ends of them, "origin" -4, and the least tag of a facet of
+// their edge. vtu, vtkhdf, vtk and xdmf have quadratic triangles, tetrahedra and edges (22, 24, 21; Triangle_6,
+// Tetrahedron_10, Edge_3), abaqus CPS6 and C3D10, msh41 and msh22 the types 9, 11 and 8, of whose tetrahedra the last
+// two nodes change places. npz has more columns in `simplices` and `facets`, in VTK's order, and the ends of each edge
+// in `middle_ends`. node has what Triangle and TetGen write with -o2: .ele, and .face in 3-D; .edge has ends alone, and
+// .poly is left out. Readers of the other formats take no such elements.
+//
 // Where regions are told, each simplex has the id of its own: cell data "region" of vtu, vtkhdf and vtk; `regions` of
 // npz, with names in `region_names` for the ids in `region_ids`; the attribute of .ele; the reference of medit; the
 // material of 2dm. In msh41 and msh22 each region is a physical group with its id and a name, whatever the numbers of
@@ -99,7 +107,7 @@ std::vector<std::string> FilesOfMeshWritten(const std::string& path, const std::
 // Tells early whether WriteMesh would refuse `path` and `format` for a mesh of `dimension` (0: not known yet) that may
 // have weights, as far as that can be known without writing.
 absl::Status CheckMeshOutput(const std::string& path, const std::string& format, int dimension = 0,
-                             bool may_have_weights = false);
+                             bool may_have_weights = false, MeshOrder order = MeshOrder::kFirst);
 
 // Writes a mesh piece by piece, so that it need not fit into memory.
 //
@@ -107,7 +115,8 @@ absl::Status CheckMeshOutput(const std::string& path, const std::string& format,
 //         for node with weights or tags of vertices the points, for msh41 and msh22 with weights these. With several
 //         regions, for msh41, msh22, medit and node also 16 bytes for each run of simplices of one region; for msh41
 //         into a pipe or a device the simplices, and otherwise 4 KiB a region. For vtk all data of vertices; for abaqus
-//         the points, the facets, and the simplices that may have one.
+//         the points, the facets, and the simplices that may have one. Of second order the mesh, and for the edges 24
+//         bytes a tetrahedron or 12 a triangle, and 8 a vertex: the file appears with Commit alone.
 // Thread safety: thread-compatible.
 class MeshWriter {
  public:

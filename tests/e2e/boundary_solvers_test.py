@@ -214,6 +214,28 @@ print("cells", len(cells.values), len(set(cells.values)))
                 found = numpy.array([[float(x) for x in row[1:dimension + 1]] for row in rows])
                 numpy.testing.assert_allclose(found, expected, atol=1e-5 * numpy.abs(expected).max())
 
+    @unittest.skipUnless(shutil.which("ccx"), "calculix-ccx is not installed")
+    def test_calculix_bends_a_bar_of_second_order(self):
+        """The force that bends a clamped bar, 10 long, by 0.01: 3 E I u / L^3. Tetrahedra of 4 nodes are too stiff."""
+        corners = [(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 10)]
+        sides = ["0 2 3 1", "4 5 7 6", "0 1 5 4", "2 6 7 3", "0 4 6 2", "1 3 7 5"]
+        (self.folder / "bar.smesh").write_text("\n".join(
+            ["8 3 0 0", *(f"{i} {x} {y} {z}" for i, (x, y, z) in enumerate(corners)),
+             "6 1", *(f"4 {side} {tag}" for tag, side in enumerate(sides, 1)), "0", "0", ""]))
+        forces = {}
+        for order, kind in ((1, "C3D4"), (2, "C3D10")):
+            self.wellspace("mesh", "bar.smesh", "-o", f"bar{order}.inp", "--edge-length", 1.2, "--order", order,
+                           "--quiet")
+            self.assertIn(f"TYPE={kind}, ELSET=domain", (self.folder / f"bar{order}.inp").read_text())
+            (self.folder / f"bend{order}.inp").write_text("\n".join(
+                [f"*INCLUDE, INPUT=bar{order}.inp", "*MATERIAL, NAME=steel", "*ELASTIC", "210000., 0.3",
+                 "*SOLID SECTION, ELSET=domain, MATERIAL=steel", "*BOUNDARY", "marker_5, 1, 3", "marker_6, 3, 3, 0.01",
+                 "*STEP", "*STATIC", "*NODE PRINT, NSET=marker_5, TOTALS=ONLY", "RF", "*END STEP", ""]))
+            self.run_program("ccx", "-i", f"bend{order}")
+            forces[order] = -float((self.folder / f"bend{order}.dat").read_text().split()[-1])
+        self.assertAlmostEqual(forces[2], 0.525, delta=0.02 * 0.525)
+        self.assertGreater(forces[1], 2 * 0.525)
+
     @staticmethod
     def in_width(conditions):
         """Values of conditions in the 20 characters that CalculiX reads of them."""

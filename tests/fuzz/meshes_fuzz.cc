@@ -96,6 +96,12 @@ void ReadWriteRead(const std::string& path, const std::string& copy) {
               (mesh->simplex_regions.empty() ? AreSameBits(again->simplices, mesh->simplices)
                                              : Sorted(*again) == Sorted(*mesh)),
           "a mesh reads back to the bit");
+  if (mesh->dimension <= 3) {
+    formats::MeshView second = mesh->View();
+    second.order = formats::MeshOrder::kSecond;
+    const absl::Status status = formats::WriteMesh(ScratchFolder::Get().Path("second.npz"), "", second);
+    Require(status.ok(), "a mesh can be written with elements of second order:", status.ToString());
+  }
 }
 
 void ReadVtu(std::string_view document) {

@@ -7,7 +7,6 @@
 #include "absl/strings/str_cat.h"
 #include "client/cli/commands/commands.h"
 #include "client/cli/exit_codes.h"
-#include "client/cli/mesh_paths.h"
 #include "client/cli/meshing_options.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/statistics.h"
@@ -31,9 +30,7 @@ constexpr char kMeshExamples[] =
     "  wellspace mesh cow.csv -o cow.vtu --size-field sizes.csv --gradation 0.2\n";
 
 struct MeshCommand {
-  std::string output;
-  std::string format;
-  bool no_boundary = false;
+  MeshOutput output;
   bool no_attributes = false;
   MeshingOptions options;
 
@@ -45,25 +42,26 @@ struct MeshCommand {
 
 absl::Status MeshCommand::CheckOptions() const {
   WELLSPACE_RETURN_IF_ERROR(options.Check());
-  if (options.has_figures_on_stdout() && output == formats::kStandardStream) {
+  if (options.has_figures_on_stdout() && output.path == formats::kStandardStream) {
     return absl::InvalidArgumentError("--stats or --output json, and --out: only one of them can be standard output");
   }
-  WELLSPACE_RETURN_IF_ERROR(CheckMeshOutput(output, format, options.dimension()));
+  WELLSPACE_RETURN_IF_ERROR(output.Check(options.dimension()));
   formats::FilePlan files;
   options.AddFilesTo(files);
-  files.WritesMesh("--out", output, format);
+  files.WritesMesh("--out", output.path, output.format);
   return files.Check();
 }
 
 absl::Status MeshCommand::Mesh(client::Client& client, const client::MeshOptions& mesh_options,
                                const formats::PointCloud& cloud, const client::CallOptions& call) const {
   // Now that the dimension is known for sure, and before hours of work.
-  WELLSPACE_RETURN_IF_ERROR(CheckMeshOutput(output, format, cloud.dimension, mesh_options.pump_weights));
-  client::MeshFile file(output, format, call.stop);
+  WELLSPACE_RETURN_IF_ERROR(output.Check(cloud.dimension, mesh_options.pump_weights));
+  client::MeshFile file(output.path, output.format, call.stop);
+  file.SetOrder(output.order);
   file.KeepInputVertices();
   file.AddAttributes(cloud.attributes);
   file.NameParts(options.PartNames());
-  if (no_boundary) {
+  if (output.no_boundary) {
     file.LeaveOutBoundary();
   }
   {
@@ -81,12 +79,13 @@ absl::Status MeshCommand::Mesh(client::Client& client, const client::MeshOptions
       options.WriteStatistics(client::StatisticsJson(file.header(), file.input_vertex()).dump(2) + "\n", notes));
   PrintNotes({.notes = notes}, options.remote().format(), options.remote().quiet());
   if (!options.remote().quiet()) {
-    std::cerr << Summary(file.header()) << (output == formats::kStandardStream ? "" : " -> " + output) << "\n";
+    std::cerr << Summary(file.header()) << (output.path == formats::kStandardStream ? "" : " -> " + output.path)
+              << "\n";
   }
   // A demand that is not met is told of without --quiet or with it; in JSON the statistics have it.
   if (!options.remote().json()) {
     std::cerr << SliverWarning(file.header())
-              << (no_boundary || options.remote().quiet() ? "" : BoundaryWarning(file.header()));
+              << (output.no_boundary || options.remote().quiet() ? "" : BoundaryWarning(file.header()));
   }
   return absl::OkStatus();
 }
@@ -95,7 +94,7 @@ int MeshCommand::Run() {
   if (const absl::Status status = CheckOptions(); !status.ok()) {
     return ReportError(status, options.remote().format());
   }
-  if (!no_attributes && !no_boundary && formats::HasPlaceForAttributes(output, format)) {
+  if (!no_attributes && !output.no_boundary && formats::HasPlaceForAttributes(output.path, output.format)) {
     options.KeepAttributes();
   }
   return options.Run([this](client::Client& client, const client::MeshOptions& mesh_options,
@@ -110,7 +109,7 @@ void AddMeshCommand(CLI::App& app, int& exit_code) {
   CLI::App* mesh = app.add_subcommand("mesh", "Mesh a point cloud, a domain in the plane, or the inside of a surface");
   mesh->footer(absl::StrCat(kCloudsHelp, kMeshesHelp, kMeshExamples, "\n", kExitCodesHelp));
   command->options.AddTo(*mesh);
-  AddMeshOutput(*mesh, command->output, command->format, command->no_boundary);
+  AddMeshOutput(*mesh, command->output);
   AddNoAttributes(*mesh, command->no_attributes);
   mesh->callback([command, &exit_code] { exit_code = command->Run(); });
 }

@@ -10,7 +10,6 @@
 #include "client/cli/cloud_options.h"
 #include "client/cli/commands/commands.h"
 #include "client/cli/domain_options.h"
-#include "client/cli/mesh_paths.h"
 #include "client/cli/meshing_options.h"
 #include "client/cli/options.h"
 #include "client/cli/part_name_options.h"
@@ -263,9 +262,7 @@ void UploadCommand::Print(const client::Uploaded& uploaded, const char* what, co
 struct DownloadCommand {
   RemoteCommand remote;
   std::string session;
-  std::string path;
-  std::string format;
-  bool no_boundary = false;
+  MeshOutput output;
   std::optional<uint64_t> revision;
 
   absl::Status Check() const;
@@ -273,13 +270,13 @@ struct DownloadCommand {
 };
 
 absl::Status DownloadCommand::Check() const {
-  if (remote.json() && path == formats::kStandardStream) {
+  if (remote.json() && output.path == formats::kStandardStream) {
     return absl::InvalidArgumentError("--output json and --out: only one of them can be standard output");
   }
-  WELLSPACE_RETURN_IF_ERROR(CheckMeshOutput(path, format));
+  WELLSPACE_RETURN_IF_ERROR(output.Check());
   formats::FilePlan files;
   remote.AddFilesTo(files);
-  files.WritesMesh("--out", path, format);
+  files.WritesMesh("--out", output.path, output.format);
   if (remote.json()) {
     files.Writes("--output json", std::string(formats::kStandardStream));
   }
@@ -287,11 +284,12 @@ absl::Status DownloadCommand::Check() const {
 }
 
 absl::Status DownloadCommand::Download(client::Client& client, const client::CallOptions& call) const {
-  client::MeshFile file(path, format, call.stop);
+  client::MeshFile file(output.path, output.format, call.stop);
+  file.SetOrder(output.order);
   if (remote.json()) {
     file.KeepInputVertices();
   }
-  if (no_boundary) {
+  if (output.no_boundary) {
     file.LeaveOutBoundary();
   }
   {
@@ -313,11 +311,13 @@ absl::Status DownloadCommand::Download(client::Client& client, const client::Cal
                      client::StatisticsJson(file.header(), file.input_vertex(), file.moved_vertices()).dump(2) + "\n")
               << std::flush;
   } else if (!remote.quiet()) {
-    std::cerr << Summary(file.header()) << (path == formats::kStandardStream ? "" : " -> " + path) << "\n";
+    std::cerr << Summary(file.header()) << (output.path == formats::kStandardStream ? "" : " -> " + output.path)
+              << "\n";
   }
   PrintNotes({.notes = file.notes()}, remote.format(), remote.quiet());
   if (!remote.json()) {
-    std::cerr << SliverWarning(file.header()) << (no_boundary || remote.quiet() ? "" : BoundaryWarning(file.header()));
+    std::cerr << SliverWarning(file.header())
+              << (output.no_boundary || remote.quiet() ? "" : BoundaryWarning(file.header()));
   }
   return absl::OkStatus();
 }
@@ -369,7 +369,7 @@ void AddDownload(CLI::App& app, int& exit_code) {
   CLI::App* download = app.add_subcommand("download", "Write the mesh of a session to a file, while it arrives");
   download->footer(absl::StrCat(kMeshesHelp, "\n", kExitCodesHelp));
   AddSession(*download, command->session);
-  AddMeshOutput(*download, command->path, command->format, command->no_boundary);
+  AddMeshOutput(*download, command->output);
   AddCount(
       *download, "--revision", [command](uint64_t revision) { command->revision = revision; },
       "Fail unless the mesh is of this revision; default: the last", 1);

@@ -56,12 +56,17 @@ class MshWriter : public MeshWriter {
 
   absl::Status AddSimplices(std::span<const uint32_t> simplices) final {
     BeginElements();
-    const size_t corners = shape_.dimension + 1;
-    WELLSPACE_RETURN_IF_ERROR(regions_.CheckNext(shape_.has_simplex_regions ? simplices.size() / corners : 0));
-    for (; !simplices.empty() && output_.status().ok(); simplices = simplices.subspan(corners)) {
+    const size_t nodes = shape_.simplex_nodes();
+    WELLSPACE_RETURN_IF_ERROR(regions_.CheckNext(shape_.has_simplex_regions ? simplices.size() / nodes : 0));
+    std::vector<uint32_t> simplex;
+    for (; !simplices.empty() && output_.status().ok(); simplices = simplices.subspan(nodes)) {
       const int32_t group = shape_.has_simplex_regions ? regions_.Next() : groups_.first();
+      simplex.assign(simplices.begin(), simplices.begin() + nodes);
+      if (type() == kMshSecondTetrahedron) {  // Gmsh's last edges are 23 and 13
+        std::swap(simplex[8], simplex[9]);
+      }
       row_.clear();
-      WriteSimplex(simplices.first(corners), group, ++simplices_, row_);
+      WriteSimplex(simplex, group, ++simplices_, row_);
     }
     return output_.status();
   }
@@ -69,13 +74,14 @@ class MshWriter : public MeshWriter {
   absl::Status AddFacets(std::span<const uint32_t> facets) final {
     BeginElements();
     EndSimplices();
-    for (; !facets.empty() && output_.status().ok(); facets = facets.subspan(shape_.dimension)) {
+    const size_t nodes = shape_.facet_nodes();
+    for (; !facets.empty() && output_.status().ok(); facets = facets.subspan(nodes)) {
       row_.clear();
       const BoundaryPart& part = walk_.Next();
       if (walk_.is_first()) {
         AppendBlock(part, row_);
       }
-      AppendFacet(facets.first(shape_.dimension), part.tag, simplices_ + ++facets_, row_);
+      AppendFacet(facets.first(nodes), part.tag, simplices_ + ++facets_, row_);
       output_.Write(row_);
     }
     return output_.status();
@@ -105,8 +111,8 @@ class MshWriter : public MeshWriter {
   MshWriter(OutputFile output, const MeshShape& shape, bool is_binary)
       : shape_(shape), output_(std::move(output)), is_binary_(is_binary) {}
 
-  int type() const { return shape_.dimension == 2 ? kMshTriangle : kMshTetrahedron; }
-  int facet_type() const { return shape_.dimension == 2 ? kMshLine : kMshTriangle; }
+  int32_t type() const { return TypeOf(shape_.dimension + 1); }
+  int32_t facet_type() const { return TypeOf(shape_.dimension); }
   uint64_t element_count() const { return shape_.simplex_count + shape_.facet_count(); }
 
   const MeshShape shape_;
@@ -129,6 +135,13 @@ class MshWriter : public MeshWriter {
   virtual void AppendBlock(const BoundaryPart& /*part*/, std::string& /*row*/) const {}
   virtual void AppendFacet(std::span<const uint32_t> corners, int32_t tag, uint64_t number, std::string& row) const = 0;
   virtual void AppendData(uint64_t node, double value, std::string& row) const = 0;
+
+  int32_t TypeOf(int corners) const {
+    if (shape_.order == MeshOrder::kSecond) {
+      return corners == 2 ? kMshSecondLine : corners == 3 ? kMshSecondTriangle : kMshSecondTetrahedron;
+    }
+    return corners == 2 ? kMshLine : corners == 3 ? kMshTriangle : kMshTetrahedron;
+  }
 
   // `end`: "$EndNodes" and the like. Behind bytes, it is in a line of its own.
   void EndSection(std::string_view end) {
@@ -286,7 +299,7 @@ class Msh41Writer final : public MshWriter {
       if (output_.IsSeekable()) {
         output_.Write(block.header);
         block.place = output_.size();
-        WriteZeros(simplices * (shape_.dimension + 2) * sizeof(uint64_t));
+        WriteZeros(simplices * (shape_.simplex_nodes() + 1) * sizeof(uint64_t));
       }
     }
   }

@@ -21,6 +21,11 @@ inline constexpr char kNpzFacetNameTags[] = "facet_name_tags.npy";  // the tag o
 // Only of meshes with creases, in 3-D.
 inline constexpr char kNpzRidges[] = "ridges.npy";  // ridge_count x 2, indices of points
 
+// Only of second order: `simplices` and `facets` have further columns, the nodes at the middles of edges in VTK's
+// order, which are the last rows of `points` and of all data of vertices.
+inline constexpr char kNpzMiddleEnds[] =
+    "middle_ends.npy";  // middle nodes x 2: the ends of the edge of each, ascending
+
 // Only of a part of a larger mesh.
 inline constexpr char kNpzPart[] = "part.npy";             // part, parts, own vertices, own simplices
 inline constexpr char kNpzVertexIds[] = "vertex_ids.npy";  // vertex_count; so the next two

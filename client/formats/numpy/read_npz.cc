@@ -59,6 +59,21 @@ absl::Status ReadTags(ZipReader& archive, const std::string& file, const std::st
   return absl::OkStatus();
 }
 
+// Where vertices come from: numbers of input points, or -1, -2 and -3.
+absl::Status ReadOrigins(ZipReader& archive, const std::string& file, Mesh& mesh) {
+  std::vector<double> values;
+  WELLSPACE_RETURN_IF_ERROR(ReadOfPoints(archive, file, kNpzOrigins, "origins", mesh.View().vertex_count(), values));
+  constexpr double kLowest = SignedOrigin(kCornerOrigin);
+  for (size_t i = 0; i < values.size(); ++i) {
+    if (!(values[i] >= kLowest && values[i] < kCornerOrigin) || values[i] != std::trunc(values[i])) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          file, ": ", kNpzOrigins, ": row ", i, ": expected the number of a point, or -1, -2 or -3, got ", values[i]));
+    }
+    mesh.vertex_origins.push_back(static_cast<uint32_t>(static_cast<int64_t>(values[i])));
+  }
+  return absl::OkStatus();
+}
+
 // Texts of UTF-32, a row each.
 absl::Status ReadNames(ZipReader& archive, const std::string& file, const std::string& member,
                        std::vector<std::string>& names) {
@@ -181,6 +196,9 @@ absl::StatusOr<Mesh> ReadNpz(const std::string& path, const std::string& numbers
   }
   if (archive->Has(kNpzFacets)) {
     WELLSPACE_RETURN_IF_ERROR(ReadBoundary(*archive, name, mesh));
+  }
+  if (archive->Has(kNpzOrigins)) {
+    WELLSPACE_RETURN_IF_ERROR(ReadOrigins(*archive, name, mesh));
   }
   if (archive->Has(kNpzRidges)) {
     WELLSPACE_RETURN_IF_ERROR(ReadRidges(*archive, name, mesh));

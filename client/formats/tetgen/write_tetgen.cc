@@ -1,4 +1,5 @@
 // TetGen's and Triangle's .node and .ele, and for the boundary .edge or .face, and .poly.
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
@@ -19,7 +20,13 @@
 namespace wellspace::formats {
 namespace {
 
-// The files of a mesh. Files of the boundary are there if the mesh has one; the last one for 2-D and 3-D only.
+// The edges whose middles are the nodes behind the corners, as Triangle and TetGen have them with -o2, by their place
+// in kElementEdges. The first node of a triangle is opposite of its first corner, and so on.
+constexpr uint8_t kEdgesOfTriangle[] = {1, 2, 0};
+constexpr uint8_t kEdgesOfTetrahedron[] = {5, 3, 0, 1, 4, 2};
+
+// The files of a mesh. Files of the boundary are there if the mesh has one; the last one for 2-D and 3-D only, and of
+// first order: its vertices are all points of .node.
 struct TetgenFiles {
   OutputFile nodes;
   OutputFile simplices;
@@ -39,7 +46,7 @@ class NodeAndEleWriter final : public MeshWriter {
     AddNote(regions.ChangesNote());
     files_.simplices.Write(regions.Text("# "));
     files_.simplices.Write(
-        absl::StrCat(shape.simplex_count, " ", shape.dimension + 1, shape.regions.empty() ? " 0\n" : " 1\n"));
+        absl::StrCat(shape.simplex_count, " ", shape.simplex_nodes(), shape.regions.empty() ? " 0\n" : " 1\n"));
     if (!shape.regions.empty()) {
       region_ = absl::StrCat(" ", shape.regions[0].id);
     }
@@ -73,13 +80,13 @@ class NodeAndEleWriter final : public MeshWriter {
   }
 
   absl::Status AddSimplices(std::span<const uint32_t> simplices) override {
-    const size_t corners = shape_.dimension + 1;
-    WELLSPACE_RETURN_IF_ERROR(regions_.CheckNext(shape_.has_simplex_regions ? simplices.size() / corners : 0));
+    const size_t nodes = shape_.simplex_nodes();
+    WELLSPACE_RETURN_IF_ERROR(regions_.CheckNext(shape_.has_simplex_regions ? simplices.size() / nodes : 0));
     OutputFile& output = files_.simplices;
-    for (; !simplices.empty() && output.status().ok(); simplices = simplices.subspan(corners)) {
+    for (; !simplices.empty() && output.status().ok(); simplices = simplices.subspan(nodes)) {
       line_.clear();
       AppendNumber(simplices_written_++, line_);
-      AppendCorners(simplices.first(corners), line_);
+      AppendNodes(simplices.first(nodes), shape_.dimension + 1, line_);
       if (shape_.has_simplex_regions) {
         region_ = absl::StrCat(" ", regions_.Next());
       }
@@ -93,10 +100,13 @@ class NodeAndEleWriter final : public MeshWriter {
     if (!files_.facets.has_value()) {
       return absl::InternalError("a mesh without a boundary got facets");
     }
-    for (; !facets.empty() && files_.facets->status().ok(); facets = facets.subspan(shape_.dimension)) {
+    const size_t nodes = shape_.facet_nodes();
+    // Triangle has the ends of edges in .edge with -o2, too.
+    const size_t written = shape_.dimension == 2 ? 2 : nodes;
+    for (; !facets.empty() && files_.facets->status().ok(); facets = facets.subspan(nodes)) {
       line_.clear();
       AppendNumber(facets_written_++, line_);
-      AppendCorners(facets.first(shape_.dimension), line_);
+      AppendNodes(facets.first(written), shape_.dimension, line_);
       const int32_t tag = walk_.Next().tag;
       absl::StrAppend(&line_, " ", tag, "\n");
       files_.facets->Write(line_);
@@ -137,6 +147,16 @@ class NodeAndEleWriter final : public MeshWriter {
   }
 
  private:
+  // The nodes of an element of `corners` corners.
+  static void AppendNodes(std::span<const uint32_t> nodes, size_t corners, std::string& line) {
+    AppendCorners(nodes.first(corners), line);
+    const std::span<const uint32_t> middles = nodes.subspan(corners);
+    const uint8_t* const edges = corners == 3 ? kEdgesOfTriangle : kEdgesOfTetrahedron;
+    for (size_t i = 0; i < middles.size(); ++i) {
+      AppendCorners(middles.subspan(edges[i], 1), line);
+    }
+  }
+
   static void AppendCorners(std::span<const uint32_t> corners, std::string& line) {
     for (const uint32_t corner : corners) {
       line += ' ';
@@ -222,7 +242,10 @@ absl::StatusOr<std::unique_ptr<MeshWriter>> CreateNodeAndEle(const std::string& 
                                                              std::stop_token stop) {
   std::vector<std::string> names = {WithExtension(path, ".node"), WithExtension(path, ".ele")};
   if (!shape.boundary.empty()) {
-    const std::vector<std::string> of_boundary = BoundaryFilesOf(path, shape.dimension);
+    std::vector<std::string> of_boundary = BoundaryFilesOf(path, shape.dimension);
+    if (shape.order == MeshOrder::kSecond) {
+      of_boundary.resize(1);
+    }
     names.insert(names.end(), of_boundary.begin(), of_boundary.end());
   }
   std::vector<OutputFile> outputs;

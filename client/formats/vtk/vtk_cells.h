@@ -15,17 +15,23 @@ inline constexpr uint8_t kVtkPolyVertex = 2;
 inline constexpr uint8_t kVtkLine = 3;
 inline constexpr uint8_t kVtkTriangle = 5;
 inline constexpr uint8_t kVtkTetrahedron = 10;
+inline constexpr uint8_t kVtkQuadraticEdge = 21;
+inline constexpr uint8_t kVtkQuadraticTriangle = 22;
+inline constexpr uint8_t kVtkQuadraticTetrahedron = 24;
 
 inline uint64_t VtkCellCount(const MeshShape& shape) { return shape.simplex_count + shape.facet_count(); }
 
-// Vertices of all cells before number `cell`.
+// Nodes of all cells before number `cell`.
 inline uint64_t VtkOffset(const MeshShape& shape, uint64_t cell) {
   const uint64_t simplices = cell < shape.simplex_count ? cell : shape.simplex_count;
-  return cell * shape.dimension + simplices;
+  return simplices * shape.simplex_nodes() + (cell - simplices) * shape.facet_nodes();
 }
 
 inline uint8_t VtkCellType(const MeshShape& shape, uint64_t cell) {
   const int corners = shape.dimension + (cell < shape.simplex_count ? 1 : 0);
+  if (shape.order == MeshOrder::kSecond) {
+    return corners == 2 ? kVtkQuadraticEdge : corners == 3 ? kVtkQuadraticTriangle : kVtkQuadraticTetrahedron;
+  }
   return corners == 2 ? kVtkLine : corners == 3 ? kVtkTriangle : kVtkTetrahedron;
 }
 

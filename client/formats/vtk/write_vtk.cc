@@ -121,14 +121,14 @@ class VtkWriter final : public MeshWriter {
   }
 
   absl::Status AddSimplices(std::span<const uint32_t> simplices) override {
-    AddCells(simplices, shape_.dimension + 1);
-    simplices_ += simplices.size() / (shape_.dimension + 1);
+    AddCells(simplices, shape_.simplex_nodes());
+    simplices_ += simplices.size() / shape_.simplex_nodes();
     return output_.status();
   }
 
   absl::Status AddFacets(std::span<const uint32_t> facets) override {
-    AddCells(facets, shape_.dimension);
-    facets_ += facets.size() / shape_.dimension;
+    AddCells(facets, shape_.facet_nodes());
+    facets_ += facets.size() / shape_.facet_nodes();
     return output_.status();
   }
 
@@ -175,13 +175,13 @@ class VtkWriter final : public MeshWriter {
     }
   }
 
-  // Every cell is the number of its vertices, then these.
-  void AddCells(std::span<const uint32_t> vertices, size_t corners) {
+  // Every cell is the number of its nodes, then these.
+  void AddCells(std::span<const uint32_t> vertices, size_t nodes) {
     BeginCells();
-    for (; !vertices.empty() && output_.status().ok(); vertices = vertices.subspan(corners)) {
+    for (; !vertices.empty() && output_.status().ok(); vertices = vertices.subspan(nodes)) {
       row_.clear();
-      AppendBigEndian(static_cast<int32_t>(corners), row_);
-      for (const uint32_t vertex : vertices.first(corners)) {
+      AppendBigEndian(static_cast<int32_t>(nodes), row_);
+      for (const uint32_t vertex : vertices.first(nodes)) {
         AppendBigEndian(static_cast<int32_t>(vertex), row_);
       }
       output_.Write(row_);

@@ -134,12 +134,12 @@ class VtkHdfWriter final : public MeshWriter {
   }
 
   absl::Status AddSimplices(std::span<const uint32_t> simplices) override {
-    simplices_ += simplices.size() / (shape_.dimension + 1);
+    simplices_ += simplices.size() / shape_.simplex_nodes();
     return AddCells(simplices);
   }
 
   absl::Status AddFacets(std::span<const uint32_t> facets) override {
-    facets_ += facets.size() / shape_.dimension;
+    facets_ += facets.size() / shape_.facet_nodes();
     return AddCells(facets);
   }
 

@@ -104,7 +104,7 @@ class VtuWriter final : public MeshWriter {
     for (size_t i = 0; i < facets.size() && Status().ok(); ++i) {
       array_->Add<int64_t>(facets[i]);
     }
-    facets_ += facets.size() / shape_.dimension;
+    facets_ += facets.size() / shape_.facet_nodes();
     return Status();
   }
 
@@ -113,7 +113,7 @@ class VtuWriter final : public MeshWriter {
     for (size_t i = 0; i < simplices.size() && Status().ok(); ++i) {
       array_->Add<int64_t>(simplices[i]);
     }
-    simplices_ += simplices.size() / (shape_.dimension + 1);
+    simplices_ += simplices.size() / shape_.simplex_nodes();
     return Status();
   }
 

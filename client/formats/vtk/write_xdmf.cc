@@ -55,7 +55,7 @@ class XdmfWriter final : public MeshWriter {
       PartWalk walk(shape_.boundary);
       boundary_file_->AddArray<int32_t>(boundary_file_->file(), "facet_tags", shape_.facet_count(),
                                         [&walk](uint64_t) { return walk.Next().tag; });
-      boundary_file_->BeginArray<int64_t>(boundary_file_->file(), "facets", shape_.facet_count(), shape_.dimension);
+      boundary_file_->BeginArray<int64_t>(boundary_file_->file(), "facets", shape_.facet_count(), shape_.facet_nodes());
     }
     file_->BeginArray<double>(file_->file(), "points", shape_.vertex_count, shape_.dimension);
     array_ = "points";
@@ -98,16 +98,16 @@ class XdmfWriter final : public MeshWriter {
     return Add<int32_t>(kVtkRegion, shape_.simplex_count, 1, regions);
   }
   absl::Status AddSimplices(std::span<const uint32_t> simplices) override {
-    simplices_ += simplices.size() / (shape_.dimension + 1);
+    simplices_ += simplices.size() / shape_.simplex_nodes();
     BeginSimplices();
-    return AddCells(*file_, shape_.dimension + 1, simplices);
+    return AddCells(*file_, shape_.simplex_nodes(), simplices);
   }
   absl::Status AddFacets(std::span<const uint32_t> facets) override {
     if (!boundary_file_.has_value()) {
       return absl::InternalError("a mesh without a boundary got facets");
     }
-    facets_ += facets.size() / shape_.dimension;
-    return AddCells(*boundary_file_, shape_.dimension, facets);
+    facets_ += facets.size() / shape_.facet_nodes();
+    return AddCells(*boundary_file_, shape_.facet_nodes(), facets);
   }
 
   absl::Status Commit() override {
@@ -158,7 +158,7 @@ class XdmfWriter final : public MeshWriter {
 
   void BeginSimplices() {
     // An array without rows is one, too.
-    Add<int64_t>("simplices", shape_.simplex_count, shape_.dimension + 1, {}).IgnoreError();  // it is kept
+    Add<int64_t>("simplices", shape_.simplex_count, shape_.simplex_nodes(), {}).IgnoreError();  // it is kept
   }
 
   // The next rows of the array of `file` that has been begun.
@@ -184,16 +184,19 @@ class XdmfWriter final : public MeshWriter {
                         "\">\n", DataItem(pair, array, rows, 1, numbers), "      </Attribute>\n");
   }
 
-  // Points, and cells of `corners` vertices.
+  // Points, and cells of `corners` corners.
   std::string BeginGrid(const XdmfPair& pair, const char* name, const char* cells, uint64_t count, int corners) const {
     constexpr std::array kTypes = {"Polyline", "Triangle", "Tetrahedron"};
+    constexpr std::array kSecondTypes = {"Edge_3", "Triangle_6", "Tetrahedron_10"};
+    const int nodes = NodesOf(corners, shape_.order);
+    const char* const type = (shape_.order == MeshOrder::kFirst ? kTypes : kSecondTypes)[corners - 2];
     return absl::StrCat("<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n  <Domain>\n    <Grid Name=\"", name,
                         "\" GridType=\"Uniform\">\n      <Geometry GeometryType=\"",
                         shape_.dimension == 2 ? "XY" : "XYZ", "\">\n",
                         DataItem(mesh_, "points", shape_.vertex_count, shape_.dimension, kXdmfDouble),
-                        "      </Geometry>\n      <Topology TopologyType=\"", kTypes[corners - 2],
-                        "\" NumberOfElements=\"", count, "\" NodesPerElement=\"", corners, "\">\n",
-                        DataItem(pair, cells, count, corners, kXdmfInt64), "      </Topology>\n");
+                        "      </Geometry>\n      <Topology TopologyType=\"", type, "\" NumberOfElements=\"", count,
+                        "\" NodesPerElement=\"", nodes, "\">\n", DataItem(pair, cells, count, nodes, kXdmfInt64),
+                        "      </Topology>\n");
   }
 
   // Names by tags and ids, as meshio has them.

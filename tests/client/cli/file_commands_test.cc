@@ -6,6 +6,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "client/formats/read_cloud.h"
 #include "client/formats/read_mesh.h"
@@ -98,6 +100,77 @@ TEST_F(FileCommandsTest, ConvertKeepsBoundaryRegionsNamesAndAttributes) {
   EXPECT_EQ(RunWellspace({"convert", Path("a.vtu"), Path("a.vtu")}).exit_code, 2);
   EXPECT_THAT(RunWellspace({"convert", Path("a.vtu"), Path("a.xyz")}).err, HasSubstr("no format is known"));
   EXPECT_THAT(RunWellspace({"convert", Path("none.msh"), Path("d.vtu")}).err, HasSubstr("none.msh"));
+}
+
+// Of the mesher's own files, in one run, the same bytes as of convert.
+TEST_F(FileCommandsTest, ElementsOfSecondOrder) {
+  for (const char* cloud : {kPlane, kSpace}) {
+    for (const std::string extension : {".npz", ".vtu", ".msh", ".inp"}) {
+      SCOPED_TRACE(extension);
+      Mesh(cloud, "first.npz");
+      Mesh(cloud, "mesh" + extension, {"--order", "2"});
+      const RunResult result =
+          RunWellspace({"convert", Path("first.npz"), Path("convert" + extension), "--order", "2"});
+      ASSERT_EQ(result.exit_code, 0) << result.err;
+      EXPECT_EQ(folder_.Read("mesh" + extension), folder_.Read("convert" + extension));
+    }
+  }
+  const RunResult figures =
+      RunWellspace({"convert", Path("first.npz"), Path("a.vtk"), "--order", "2", "--output", "json"});
+  EXPECT_EQ(nlohmann::json::parse(figures.out)["order"], 2) << figures.out;
+  const int files = folder_.FileCount();
+  EXPECT_THAT(MeshFails("cloud.csv", kSpace, 2, {"--order", "3"}),
+              HasSubstr("--order: expected a whole number of at least 1 and at most 2, got \"3\""));
+  for (const char* name : {"a.su2", "a.mesh"}) {
+    const RunResult refused = RunWellspace({"convert", Path("first.npz"), Path(name), "--order", "2"});
+    EXPECT_EQ(refused.exit_code, 2);
+    EXPECT_THAT(refused.err, HasSubstr("has no elements of second order that its readers take; expected one of vtu"));
+    EXPECT_THAT(RunWellspace({"mesh", Path("none.csv"), "-o", Path(name), "--order", "2"}).err,
+                HasSubstr("has no elements of second order"));  // before anything is read
+  }
+  EXPECT_EQ(folder_.FileCount(), files);
+}
+
+// Origins of vertices come back from .npz.
+TEST_F(FileCommandsTest, ConvertKeepsOriginsOfNpz) {
+  Mesh(kPlane, "a.npz");
+  Mesh(kPlane, "a.vtu");
+  ASSERT_EQ(RunWellspace({"convert", Path("a.npz"), Path("b.vtu")}).exit_code, 0);
+  EXPECT_EQ(folder_.Read("b.vtu"), folder_.Read("a.vtu"));
+  ASSERT_EQ(RunWellspace({"convert", Path("b.vtu"), Path("b.npz")}).exit_code, 0);
+  EXPECT_EQ(folder_.Read("b.npz"), folder_.Read("a.npz"));
+}
+
+// What Python makes of the arrays is the business of read_test.py.
+TEST_F(FileCommandsTest, ConvertMakesArraysOfDomainsAndSurfaces) {
+  folder_.Write("lake.wkt", "POLYGON ((0 0, 3 0, 1 2, 0 0))");
+  folder_.Write("part.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 1\n3 0 1 2\n");
+  RunResult result = RunWellspace({"convert", Path("lake.wkt"), Path("lake.npz"), "--output", "json"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  nlohmann::json figures = nlohmann::json::parse(result.out);
+  EXPECT_EQ(figures["kind"], "domain");
+  EXPECT_EQ(figures["segments"], 3);
+  EXPECT_EQ(formats::ReadCloud(Path("lake.npz"))->size(), 3);
+  result = RunWellspace({"convert", Path("part.off"), Path("part.npz"), "--triangles", "--output", "json"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  figures = nlohmann::json::parse(result.out);
+  EXPECT_EQ(figures["kind"], "surface");
+  EXPECT_EQ(figures["triangles"], 1);
+  const int files = folder_.FileCount();
+  for (const auto& [arguments, message] :
+       {std::pair(std::vector<std::string>{"lake.wkt", "lake.vtu"},
+                  "IN is a domain, which .npz has as arrays; expected a file of npz, or `wellspace mesh`"),
+        {{"lake.wkt", "other.npz", "--order", "2"}, "--order is for meshes, and IN is a domain"},
+        {{"part.off", "part.vtu", "--triangles"}, "IN is a surface, which .npz has as arrays"},
+        {{"part.off", "other.npz", "--triangles", "--skip-invalid"}, "--skip-invalid are for points"},
+        {{"part.off", "other.npz", "--faces", "holes"}, "--faces"}}) {
+    std::vector<std::string> all = {"convert", Path(arguments[0]), Path(arguments[1])};
+    all.insert(all.end(), arguments.begin() + 2, arguments.end());
+    const RunResult refused = RunWellspace(all);
+    EXPECT_EQ(refused.exit_code, 2);
+    EXPECT_THAT(refused.err, HasSubstr(message));
+  }
+  EXPECT_EQ(folder_.FileCount(), files);
 }
 
 // Two squares with one region, or one each, whose numbers are those of markers, too.

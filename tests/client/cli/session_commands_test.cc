@@ -478,6 +478,8 @@ TEST_F(SessionCommandsTest, DownloadWritesTheMesh) {
   EXPECT_EQ(piped.exit_code, 0);
   EXPECT_EQ(piped.out, folder_.Read("a.vtu"));
   EXPECT_THAT(piped.err, IsEmpty());
+  ASSERT_EQ(Run({"download", "one", "-o", folder_.Path("a.inp"), "--order", "2"}).exit_code, 0);
+  EXPECT_THAT(folder_.Read("a.inp"), HasSubstr("9, 0.5, 1\n*ELEMENT, TYPE=CPS6, ELSET=domain\n1, 1, 2, 3, 5, 7, 6\n"));
   const int files = folder_.FileCount();
   const RunResult figures = Run({"download", "one", "-o", folder_.Path("a.npz"), "--output", "json"});
   EXPECT_EQ(json::parse(figures.out)["dimension"], 2);

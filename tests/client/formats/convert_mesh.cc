@@ -1,7 +1,10 @@
 // convert_mesh IN OUT [FORMAT]: reads a mesh in one format and writes it in another.
 // convert_mesh --cloud IN OUT: reads a cloud, and writes it as a mesh of no simplices.
-#include <cstring>
+// convert_mesh --second-order IN OUT [FORMAT]: the same as the first, with elements of second order.
 #include <iostream>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "client/formats/read_cloud.h"
 #include "client/formats/read_mesh.h"
@@ -22,16 +25,26 @@ absl::StatusOr<Mesh> ReadCloudAsMesh(const std::string& path) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const bool is_cloud = argc == 4 && std::strcmp(argv[1], "--cloud") == 0;
-  if (argc != 3 && argc != 4) {
-    std::cerr << "usage: convert_mesh IN OUT [FORMAT]\n       convert_mesh --cloud IN OUT\n";
+  std::vector<std::string> arguments(argv + 1, argv + argc);
+  const std::string option = arguments.empty() || !arguments[0].starts_with("--") ? "" : arguments[0];
+  if (!option.empty()) {
+    arguments.erase(arguments.begin());
+  }
+  const bool is_cloud = option == "--cloud";
+  const bool is_second = option == "--second-order";
+  if (arguments.size() < 2 || arguments.size() > (is_cloud ? 2 : 3) || (!option.empty() && !is_cloud && !is_second)) {
+    std::cerr << "usage: convert_mesh [--second-order] IN OUT [FORMAT]\n       convert_mesh --cloud IN OUT\n";
     return 2;
   }
-  const char* input = argv[is_cloud ? 2 : 1];
-  const char* output = argv[is_cloud ? 3 : 2];
-  const char* format = argc == 4 && !is_cloud ? argv[3] : "";
-  const absl::StatusOr<Mesh> mesh = is_cloud ? ReadCloudAsMesh(input) : wellspace::formats::ReadMesh(input);
-  const absl::Status status = mesh.ok() ? wellspace::formats::WriteMesh(output, format, mesh->View()) : mesh.status();
+  const std::string format = arguments.size() == 3 ? arguments[2] : "";
+  const absl::StatusOr<Mesh> mesh =
+      is_cloud ? ReadCloudAsMesh(arguments[0]) : wellspace::formats::ReadMesh(arguments[0]);
+  absl::Status status = mesh.status();
+  if (status.ok()) {
+    wellspace::formats::MeshView view = mesh->View();
+    view.order = is_second ? wellspace::formats::MeshOrder::kSecond : wellspace::formats::MeshOrder::kFirst;
+    status = wellspace::formats::WriteMesh(arguments[1], format, view);
+  }
   if (!status.ok()) {
     std::cerr << status << "\n";
     return 1;

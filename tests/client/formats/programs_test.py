@@ -41,10 +41,11 @@ class Programs(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.folder = pathlib.Path(folder.name)
 
-    def write(self, dimension, name, format):
+    def write(self, dimension, name, format, *options):
         points, cells, volume = grid(dimension)
         numpy.savez(self.folder / "mesh.npz", points=points, simplices=cells)
-        subprocess.run([CONVERT_MESH, self.folder / "mesh.npz", self.folder / name, format], check=True, timeout=60)
+        subprocess.run([CONVERT_MESH, *options, self.folder / "mesh.npz", self.folder / name, format], check=True,
+                       timeout=60)
         return points, cells, volume
 
     def run_program(self, *command):
@@ -102,6 +103,49 @@ class Programs(unittest.TestCase):
                                  (len(points), len(cells)))
                 total = sizes.GetOutput().GetFieldData().GetArray("Area" if dimension == 2 else "Volume").GetValue(0)
                 self.assertAlmostEqual(total, volume, places=12)
+
+    def test_gmsh_measures_our_elements_of_second_order(self):
+        """Nodes in another order than Gmsh's make Jacobians that change their signs."""
+        for dimension, format in itertools.product((2, 3), ("msh41", "msh22")):
+            with self.subTest(dimension=dimension, format=format):
+                self.write(dimension, "mesh.msh", format, "--second-order")
+                (self.folder / "quality.geo").write_text(
+                    'Merge "mesh.msh";\nPlugin(AnalyseMeshQuality).JacobianDeterminant = 1;\n'
+                    "Plugin(AnalyseMeshQuality).Run;\n")
+                text = self.run_program("gmsh", "quality.geo", "-")
+                self.assertNotRegex(text, r"Error|Warning")
+                found = re.search(rf"Jacobian for {dimension}D elements[\s\S]*minJ/maxJ\s*=\s*([-\d.e]+),", text)
+                self.assertIsNotNone(found, text)
+                self.assertAlmostEqual(float(found[1]), 1, places=3)
+
+    def test_vtk_reads_our_elements_of_second_order(self):
+        """VTK maps places in a cell as its corners alone do: edges are straight, and nodes in VTK's order."""
+        import vtk
+        readers = {"vtu": vtk.vtkXMLUnstructuredGridReader, "vtkhdf": vtk.vtkHDFReader,
+                   "vtk": vtk.vtkUnstructuredGridReader}
+        for dimension, format in itertools.product((2, 3), readers):
+            with self.subTest(dimension=dimension, format=format):
+                points, cells, volume = self.write(dimension, f"mesh.{format}", format, "--second-order")
+                reader = readers[format]()
+                reader.SetFileName(str(self.folder / f"mesh.{format}"))
+                sizes = vtk.vtkCellSizeFilter()
+                sizes.SetInputConnection(reader.GetOutputPort())
+                sizes.ComputeSumOn()
+                sizes.Update()
+                total = sizes.GetOutput().GetFieldData().GetArray("Area" if dimension == 2 else "Volume").GetValue(0)
+                self.assertAlmostEqual(total, volume, places=12)
+                found = reader.GetOutput()
+                self.assertEqual(found.GetNumberOfCells(), len(cells))
+                for number, corners in enumerate(cells):
+                    cell = found.GetCell(number)
+                    self.assertEqual(cell.GetCellType(), vtk.VTK_QUADRATIC_TRIANGLE if dimension == 2 else
+                                     vtk.VTK_QUADRATIC_TETRA)
+                    for local in ((0.1, 0.2, 0.3), (0.7, 0.05, 0.15)):
+                        local = numpy.array(local[:dimension])
+                        place, weights = [0.0] * 3, [0.0] * cell.GetNumberOfPoints()
+                        cell.EvaluateLocation(vtk.reference(0), [*local, *[0] * (3 - dimension)], place, weights)
+                        expected = numpy.array([1 - local.sum(), *local]) @ points[corners]
+                        numpy.testing.assert_allclose(place[:dimension], expected, atol=1e-14)
 
     def vtk_grid(self, dimension):
         import vtk

@@ -21,7 +21,9 @@ from ._operations import Operation
 from ._parameters import Parameters, takes
 from ._plane import PlaneArguments, RegionPolygon, RegionSeed
 from ._progress import Progress, ProgressOption
+from ._read import CloudFile, DomainFile, read
 from ._retry import CancelToken, RetryPolicy
+from ._second_order import MIDDLE, SecondOrderMesh
 from ._server import LocalServer
 from ._session_info import SessionInfo
 from ._sessions import Session
@@ -120,6 +122,7 @@ def estimate(
 
 __all__ = [
     "CORNER",
+    "MIDDLE",
     "REPAIR",
     "STEINER",
     "CancelToken",
@@ -127,11 +130,13 @@ __all__ = [
     "Cell",
     "Cells",
     "Client",
+    "CloudFile",
     "ConflictError",
     "Credentials",
     "CredentialsError",
     "DamagedAnswerError",
     "DeadlineError",
+    "DomainFile",
     "DualCells",
     "Error",
     "Estimate",
@@ -149,6 +154,7 @@ __all__ = [
     "RegionPolygon",
     "RegionSeed",
     "RetryPolicy",
+    "SecondOrderMesh",
     "ServerInfo",
     "ServerNotInstalledError",
     "Session",
@@ -162,6 +168,7 @@ __all__ = [
     "errors",
     "estimate",
     "mesh",
+    "read",
     "read_surface",
     "statistics",
 ]

@@ -16,6 +16,7 @@ import numpy as np
 
 from . import _tool
 from ._mesh_arrays import MeshArrays
+from ._second_order import second_order
 from .errors import InvalidArgumentError, MissingPackageError
 
 # By the dimension: the simplices and the facets of meshio.
@@ -25,9 +26,14 @@ _VTK_TRIANGLE, _VTK_TETRA = 5, 10
 _REALS = {"points", "weights"}
 
 
-def save(mesh: MeshArrays, path: str | os.PathLike[str], options: dict[str, Any]) -> None:
+def save(mesh: MeshArrays, path: str | os.PathLike[str], options: dict[str, Any], order: int = 1) -> None:
     """See Mesh.save. A file that cannot be written to its end is not there."""
     target = pathlib.Path(path)
+    if order == 2:
+        _save_second_order(mesh, target, options)
+        return
+    if order != 1:
+        raise InvalidArgumentError(f"order {order!r}; expected 1 or 2", field="order")
     if target.suffix != ".npz":
         is_of_tool = target.suffix in _tool.MESH_FORMATS
         if is_of_tool and not options and _tool.find() is not None:
@@ -48,6 +54,21 @@ def save(mesh: MeshArrays, path: str | os.PathLike[str], options: dict[str, Any]
         raise InvalidArgumentError(f".npz takes no options; got {', '.join(options)}", field=next(iter(options)))
     with replacing(target) as file:
         np.savez(file, **_members(mesh))
+
+
+def _save_second_order(mesh: MeshArrays, target: pathlib.Path, options: dict[str, Any]) -> None:
+    if options:
+        names = ", ".join(options)
+        raise InvalidArgumentError(f"order 2 takes no options; got {names}", field=next(iter(options)))
+    if target.suffix == ".npz":
+        second = second_order(mesh)
+        with replacing(target) as file:
+            np.savez(file, **_members(second), middle_ends=second.middle_ends.astype(np.uint32, copy=False))
+        return
+    with tempfile.TemporaryDirectory(prefix="wellspace-") as folder:
+        source = pathlib.Path(folder) / "mesh.npz"
+        save(mesh, source, {})
+        _tool.convert(source, target, order=2)
 
 
 @contextlib.contextmanager
@@ -98,11 +119,20 @@ def load(path: str | os.PathLike[str]) -> dict[str, Any]:
             arrays = pathlib.Path(folder) / "mesh.npz"
             _tool.convert(path, arrays)
             return load(arrays)
+    return _attributes(arrays_of(path), path)
+
+
+def arrays_of(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """All arrays of a .npz, by their names."""
     try:
         with np.load(path, allow_pickle=False) as archive:
-            found = {name: archive[name] for name in archive.files}
+            return {name: archive[name] for name in archive.files}
     except (zipfile.BadZipFile, ValueError, AttributeError) as error:
         raise InvalidArgumentError(f"{path}: expected .npz, with arrays of numbers: {error}", field="path") from error
+
+
+def _attributes(found: dict[str, Any], path: str | os.PathLike[str]) -> dict[str, Any]:
+    """The attributes of the mesh of these arrays, which are checked."""
     points, simplices = _checked(found, path)
     d, kind = points.shape[1], np.int32 if len(points) <= 2**31 else np.int64
     none = np.empty(0, np.int32)

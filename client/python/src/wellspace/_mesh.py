@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from . import _dual, _files, _view
+from . import _dual, _files, _second_order, _view
 from ._dual import DualCells
 from ._mesh_arrays import MeshArrays
 from ._receiver import MeshReceiver
+from ._second_order import SecondOrderMesh
 from ._view import Plot
 from .errors import InvalidArgumentError
 from .statistics import statistics_of
@@ -120,13 +121,33 @@ class Mesh(MeshArrays):
         """
         return _dual.dual_cells(self)
 
-    def save(self, path: str | os.PathLike[str], **options: Any) -> None:
+    def to_order(self, order: int) -> SecondOrderMesh:
+        """The mesh with elements of second order: 6 nodes a triangle, 10 a tetrahedron, the edges straight.
+
+        Parameters
+        ----------
+        order : int
+            2; the mesh itself is of first order.
+
+        Raises
+        ------
+        InvalidArgumentError
+            Another order, or a mesh that is not in 2-D or 3-D.
+        """
+        if order != 2:
+            raise InvalidArgumentError(f"order {order!r}; expected 2: the mesh itself is of order 1", field="order")
+        return _second_order.second_order(self)
+
+    def save(self, path: str | os.PathLike[str], *, order: int = 1, **options: Any) -> None:
         """Writes the mesh to a file; the extension says in which format.
 
         ``.npz`` needs nothing else. ``.vtu``, ``.vtkhdf``, ``.vtk``, ``.xdmf``, ``.msh``, ``.mesh``, ``.su2``,
         ``.inp``, ``.node``, ``.14`` and ``.2dm`` are written by the tool `wellspace`, on the path or named by
         ``$WELLSPACE_TOOL_BINARY``: the bytes of ``wellspace convert``, with names of parts and regions.
         Other formats, those without the tool, and all with `options`, are those of `meshio.write`, in 2-D and 3-D.
+
+        With ``order=2`` elements are of second order (`to_order`): ``.npz``, which has the arrays of `SecondOrderMesh`,
+        and by the tool ``.vtu``, ``.vtkhdf``, ``.vtk``, ``.xdmf``, ``.msh``, ``.inp`` and ``.node``.
 
         Raises
         ------
@@ -137,7 +158,7 @@ class Mesh(MeshArrays):
         OSError
             The file cannot be written; then it is not there.
         """
-        _files.save(self, path, options)
+        _files.save(self, path, options, order)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Mesh:

@@ -8,11 +8,13 @@ import os
 import pathlib
 import re
 from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ._arrays import Floats, Indices
+from ._surface import SolidSeed
 from .errors import InvalidArgumentError
 
 # Corners of an STL that are nearer to each other, as a share of the diagonal, have been rounded apart.
@@ -37,6 +39,12 @@ class SurfaceFile:
         The names of markers: of solids of an STL, of groups of an OBJ.
     weld : float
         Points no farther apart than this are meant to be one: of an STL 1e-6 of the diagonal, otherwise 0.
+    solids : str
+        Which solids are meant; see `wellspace.mesh`. ``"holes"`` of TetGen's files.
+    holes : (h, 3) float64
+        Of TetGen's files: points in solids that are not meant.
+    regions : tuple of SolidSeed
+        Of TetGen's files: points in solids that are a region of their own.
     """
 
     points: Floats
@@ -44,16 +52,28 @@ class SurfaceFile:
     markers: npt.NDArray[np.int32]
     names: dict[int, str]
     weld: float
+    solids: str = "even-odd"
+    holes: Floats = dataclasses.field(default_factory=lambda: np.empty((0, 3)))
+    regions: tuple[SolidSeed, ...] = ()
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """Of `wellspace.mesh`: ``wellspace.mesh(part.points, **part.arguments)`` meshes the inside."""
+        given = {"triangles": self.triangles, "markers": self.markers, "solids": self.solids, "weld": self.weld}
+        if len(self.holes):
+            given["holes"] = self.holes
+        if self.regions:
+            given["regions"] = self.regions
+        return given
 
 
 def read_surface(path: str | os.PathLike[str]) -> SurfaceFile:
     """Reads a surface in 3-D: .stl (text or binary), .obj or .off, and .gz of these.
 
-    Faces of more than three corners, which are to be convex, become a fan of triangles. The tool `wellspace` reads more
-    formats.
+    Faces of more than three corners, which are to be convex, become a fan of triangles. `wellspace.read` reads more
+    formats, by the tool.
 
-    The inside of ``part = read_surface("part.stl")`` is meshed by ``wellspace.mesh(part.points,
-    triangles=part.triangles, markers=part.markers, weld=part.weld)``.
+    The inside of ``part = read_surface("part.stl")`` is meshed by ``wellspace.mesh(part.points, **part.arguments)``.
 
     Raises
     ------

@@ -7,6 +7,8 @@ import json
 import os
 import pathlib
 import subprocess
+from collections.abc import Sequence
+from typing import Any
 
 from ._server import find_program
 from .errors import InvalidArgumentError, MissingPackageError
@@ -25,8 +27,12 @@ def find() -> str | None:
     return find_program(_NAME, _VARIABLE)
 
 
-def convert(source: str | os.PathLike[str], target: str | os.PathLike[str]) -> None:
-    """Writes the mesh of a file to another one, in the formats that their extensions say.
+def convert(
+    source: str | os.PathLike[str], target: str | os.PathLike[str], order: int = 1, options: Sequence[str] = ()
+) -> dict[str, Any]:
+    """Writes the mesh of a file to another one, in the formats that their extensions say, with elements of `order`.
+
+    Returns what the tool tells of it: its figures, and notes.
 
     Raises
     ------
@@ -47,10 +53,15 @@ def convert(source: str | os.PathLike[str], target: str | os.PathLike[str]) -> N
     if not folder.is_dir():
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), os.fspath(target))
     command = [tool, "convert", os.path.abspath(source), os.path.abspath(target), "--output", "json"]
+    if order != 1:
+        command += ["--order", str(order)]
+    command += options
     done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         message = _message_of(done.stderr) or f"{_NAME} ended with {done.returncode}"
         raise InvalidArgumentError(message, field="path") if done.returncode == _WRONG_FILE else OSError(message)
+    figures: dict[str, Any] = json.loads(done.stdout)
+    return figures
 
 
 def _message_of(output: str) -> str:
