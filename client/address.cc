@@ -2,6 +2,7 @@
 
 #include <arpa/inet.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cstdint>
 #include <cstdlib>
@@ -12,6 +13,7 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::client {
 namespace {
@@ -50,6 +52,11 @@ std::optional<std::string> Environment(const char* name) {
   return value == nullptr ? std::nullopt : std::make_optional<std::string>(value);
 }
 
+bool IsNameOrNumber(const std::string& host) {
+  return std::ranges::all_of(
+      host, [](unsigned char c) { return absl::ascii_isalnum(c) || c == '-' || c == '.' || c == '_'; });
+}
+
 bool IsExempt(const std::string& host) {
   std::optional<std::string> exempt = Environment("no_grpc_proxy");
   if (!exempt.has_value()) {
@@ -75,6 +82,24 @@ absl::StatusOr<std::string> HostOf(const std::string& address) {
         absl::StrCat("'", address, "' is no address of a server; expected HOST:PORT with a port from 1 to 65535"));
   }
   return *std::move(host);
+}
+
+absl::StatusOr<std::string> HostOfNamed(const std::string& address) {
+  WELLSPACE_ASSIGN_OR_RETURN(std::string host, HostOf(address));
+  constexpr size_t kLongestName = 253;
+  in6_addr ipv6;
+  const bool is_right = address.front() == '[' ? inet_pton(AF_INET6, host.c_str(), &ipv6) == 1
+                                               : IsNameOrNumber(host) && host.size() <= kLongestName;
+  if (!is_right) {
+    return absl::InvalidArgumentError(
+        "expected HOST:PORT, with the name of a host, its IPv4 address, or its IPv6 address in brackets");
+  }
+  return host;
+}
+
+std::string TargetOf(const std::string& address) {
+  // IPv6 in its brackets begins no URI.
+  return IsNameOrNumber(address.substr(0, address.rfind(':'))) ? absl::StrCat("dns:///", address) : address;
 }
 
 bool IsLoopback(const std::string& host) {

@@ -14,6 +14,12 @@ namespace wellspace::client {
 // Errors:     INVALID_ARGUMENT for anything else, saying what is too much in a URL, such as http://HOST:PORT.
 absl::StatusOr<std::string> HostOf(const std::string& address);
 
+// The same of an address that a server has named: nothing but a name of DNS or a number, IPv6 in brackets, and a port.
+absl::StatusOr<std::string> HostOfNamed(const std::string& address);
+
+// `address`, HOST:PORT, as gRPC takes it for that and nothing else: unix:7233 would be a file.
+std::string TargetOf(const std::string& address);
+
 // Whether `host` is this machine's loopback by its name or number alone; names are not looked up.
 bool IsLoopback(const std::string& host);
 

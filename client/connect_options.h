@@ -1,4 +1,4 @@
-// The credentials that a client shows a server, and that it wants to be shown.
+// The credentials that a client shows a server, and that it wants to be shown; and to which servers.
 #ifndef WELLSPACE_CLIENT_CONNECT_OPTIONS_H_
 #define WELLSPACE_CLIENT_CONNECT_OPTIONS_H_
 
@@ -16,6 +16,10 @@ struct ConnectOptions {
   std::string token = "";        // for the metadata `authorization: Bearer TOKEN`
   std::string token_file = "";   // has the token instead; read anew for each call
   bool insecure_remote = false;  // lets the token go to other machines in plain text
+
+  // Of several servers that share their sessions, calls on a session go to the one that has it, by the address that the
+  // others name, with the same credentials. Off: to this one alone, behind which a proxy finds the right one.
+  bool follow = true;
 };
 
 }  // namespace wellspace::client

@@ -2,6 +2,7 @@
 #ifndef WELLSPACE_CLIENT_CONNECTION_H_
 #define WELLSPACE_CLIENT_CONNECTION_H_
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -93,8 +94,12 @@ class Connection {
                                                     const CallOptions& call) = 0;
 };
 
-// A connection over `channel`, for example that of an embedded server.
-std::shared_ptr<Connection> MakeConnection(std::shared_ptr<grpc::Channel> channel, const RetryPolicy& policy = {});
+// Opens a channel to a server that another one has named as the owner of a session. `address` is HOST:PORT.
+using OpenChannelTo = std::function<absl::StatusOr<std::shared_ptr<grpc::Channel>>(const std::string& address)>;
+
+// A connection over `channel`, for example that of an embedded server. Without `open` it goes to no other server.
+std::shared_ptr<Connection> MakeConnection(std::shared_ptr<grpc::Channel> channel, const RetryPolicy& policy = {},
+                                           OpenChannelTo open = nullptr);
 
 }  // namespace wellspace::client
 

@@ -31,6 +31,15 @@ std::string ReasonOf(const absl::Status& status) {
   return detail.has_value() ? detail->reason() : "";
 }
 
+std::string OwnerAddressOf(const absl::Status& status) {
+  const std::optional<google::rpc::ErrorInfo> detail = DetailOf<google::rpc::ErrorInfo>(status);
+  if (!detail.has_value() || detail->reason() != "ERROR_REASON_SESSION_ELSEWHERE") {
+    return "";
+  }
+  const auto address = detail->metadata().find("address");
+  return address == detail->metadata().end() ? "" : address->second;
+}
+
 std::optional<absl::Duration> RetryDelayOf(const absl::Status& status) {
   const std::optional<google::rpc::RetryInfo> detail = DetailOf<google::rpc::RetryInfo>(status);
   if (!detail.has_value()) {

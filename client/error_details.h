@@ -23,6 +23,10 @@ std::string BlamedField(const absl::Status& status);
 // server's.
 std::string ReasonOf(const absl::Status& status);
 
+// Of an error SESSION_ELSEWHERE: the address of the server that has the session, as the server that was asked has named
+// it; not checked in any way. Empty: it is not known, or another error.
+std::string OwnerAddressOf(const absl::Status& status);
+
 // The time that the server wants a client to wait before it tries again; absent: it does not say that this would help.
 std::optional<absl::Duration> RetryDelayOf(const absl::Status& status);
 

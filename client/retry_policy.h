@@ -12,8 +12,9 @@ namespace wellspace::client {
 // The patience of a connection. An attempt that brought something (a chunk, an event, committed points) is not counted:
 // later ones begin anew.
 struct RetryPolicy {
-  // Attempts in a row that may fail, with a server that has answered before; at least 1.
-  int max_attempts = 8;
+  // Attempts in a row that may fail, with a server that has answered before; at least 1. So many take longer than the
+  // 15 s after which another server takes over what one had that died.
+  int max_attempts = 9;
 
   // As above, with a server that has never answered: its address may be wrong.
   int max_first_attempts = 3;

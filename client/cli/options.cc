@@ -123,6 +123,13 @@ void AddServer(CLI::App& command, ServerChoice& choice) {
       .add_flag("--insecure-remote", connect.insecure_remote,
                 "Allow to send the token to another machine in plain text")
       ->group("Server");
+  command
+      .add_flag_callback(
+          "--no-follow", [&connect] { connect.follow = false; },
+          "Ask no other server than this one, also where it says that another one has the session; for servers behind "
+          "a proxy")
+      ->envname("WELLSPACE_NO_FOLLOW")
+      ->group("Server");
   if (const char* token = std::getenv("WELLSPACE_TOKEN"); token != nullptr) {
     connect.token = token;
   }

@@ -43,9 +43,9 @@ CLI::Option* AddNumbers(CLI::App& command, const std::string& name, std::vector<
 CLI::Option* AddNumberLists(CLI::App& command, const std::string& name, std::vector<std::vector<double>>& lists,
                             const std::string& description);
 
-// --server, and how to talk to it: --tls, --tls-ca, --tls-cert, --tls-key, --token-file, --insecure-remote; the
-// environment's WELLSPACE_SERVER, WELLSPACE_TLS_CA, …, and WELLSPACE_TOKEN for the token itself, which --token-file
-// overrules.
+// --server, and how to talk to it: --tls, --tls-ca, --tls-cert, --tls-key, --token-file, --insecure-remote,
+// --no-follow; the environment's WELLSPACE_SERVER, WELLSPACE_TLS_CA, …, and WELLSPACE_TOKEN for the token itself, which
+// --token-file overrules.
 void AddServer(CLI::App& command, ServerChoice& choice);
 
 }  // namespace wellspace::cli

@@ -2,6 +2,7 @@
 #include <optional>
 #include <utility>
 
+#include "client/error_details.h"
 #include "client/grpc/convert.h"
 #include "client/grpc/feature_messages.h"
 #include "client/grpc/grpc_connection.h"
@@ -83,15 +84,13 @@ void Send(const Given& given, const typename Kind::Offset& offset, typename Kind
   stream.WritesDone();
 }
 
-// `find`: the session, in an attempt.
-template <typename Kind, typename Given, typename Find>
+// `run`: makes attempts at the server that has the session.
+template <typename Kind, typename Given, typename Run>
 absl::Status Add(const std::string& session, const Given& given, std::optional<typename Kind::Offset> begin,
-                 const CallOptions& call, const Find& find, v1::SessionService::Stub& stub, Retrier& retrier,
-                 typename Kind::Response* response) {
-  std::optional<uint64_t> expected_revision = call.expected_revision;
-  return retrier.Run(call.timeout, call.stop, [&](Attempt& attempt) {
+                 std::optional<uint64_t> expected_revision, const Run& run, typename Kind::Response* response) {
+  return run([&](const Server& server, Attempt& attempt) {
     if (!begin.has_value()) {
-      const absl::StatusOr<v1::Session> found = find(attempt);
+      const absl::StatusOr<v1::Session> found = FetchSession(session, server, attempt);
       if (!found.ok()) {
         return found.status();
       }
@@ -99,13 +98,18 @@ absl::Status Add(const std::string& session, const Given& given, std::optional<t
     }
     CallContext context(attempt);
     RequestWriter<typename Kind::Request> stream(
-        [&](grpc::CompletionQueue* queue) { return Kind::Prepare(stub, context.get(), response, queue); });
+        [&](grpc::CompletionQueue* queue) { return Kind::Prepare(*server.sessions, context.get(), response, queue); });
     typename Kind::Request first;
     first.set_name(session);
     // The commits of an attempt before this one have changed the revision.
-    SetExpectedRevision(std::exchange(expected_revision, std::nullopt), first);
+    const std::optional<uint64_t> expected = std::exchange(expected_revision, std::nullopt);
+    SetExpectedRevision(expected, first);
     Send<Kind>(given, *begin, std::move(first), stream);
-    return FromGrpcStatus(stream.Finish());
+    const absl::Status status = FromGrpcStatus(stream.Finish());
+    if (!OwnerAddressOf(status).empty()) {
+      expected_revision = expected;  // a server that has not the session commits nothing
+    }
+    return status;
   });
 }
 
@@ -115,8 +119,8 @@ absl::StatusOr<AddedSegments> GrpcConnection::AddSegments(const std::string& ses
                                                           const std::optional<FeatureOffset>& offset,
                                                           const CallOptions& call) {
   v1::AddSegmentsResponse response;
-  const auto find = [&](const Attempt& attempt) { return FetchSession(session, attempt); };
-  WELLSPACE_RETURN_IF_ERROR(Add<SegmentKind>(session, features, offset, call, find, *sessions_, retrier_, &response));
+  const auto run = [&](const AttemptAt& attempt_at) { return RunOn(session, call, attempt_at); };
+  WELLSPACE_RETURN_IF_ERROR(Add<SegmentKind>(session, features, offset, call.expected_revision, run, &response));
   return AddedSegments{
       .segment_count = response.segment_count(), .seed_count = response.seed_count(), .revision = response.revision()};
 }
@@ -125,8 +129,8 @@ absl::StatusOr<AddedTriangles> GrpcConnection::AddTriangles(const std::string& s
                                                             const std::optional<SurfaceOffset>& offset,
                                                             const CallOptions& call) {
   v1::AddTrianglesResponse response;
-  const auto find = [&](const Attempt& attempt) { return FetchSession(session, attempt); };
-  WELLSPACE_RETURN_IF_ERROR(Add<TriangleKind>(session, surface, offset, call, find, *sessions_, retrier_, &response));
+  const auto run = [&](const AttemptAt& attempt_at) { return RunOn(session, call, attempt_at); };
+  WELLSPACE_RETURN_IF_ERROR(Add<TriangleKind>(session, surface, offset, call.expected_revision, run, &response));
   return AddedTriangles{.triangle_count = response.triangle_count(),
                         .seed_count = response.seed_count(),
                         .revision = response.revision()};

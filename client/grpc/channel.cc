@@ -183,7 +183,7 @@ absl::StatusOr<std::shared_ptr<grpc::Channel>> OpenChannel(const std::string& ad
   std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> interceptors;
   interceptors.push_back(std::make_unique<CredentialsInterceptorFactory>(
       Way{std::move(token), host, is_direct ? std::nullopt : ProxyFor(host)}));
-  return grpc::experimental::CreateCustomChannelWithInterceptors(address, credentials, all_arguments,
+  return grpc::experimental::CreateCustomChannelWithInterceptors(TargetOf(address), credentials, all_arguments,
                                                                  std::move(interceptors));
 }
 

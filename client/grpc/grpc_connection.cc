@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <random>
+#include <utility>
 
 #include "absl/strings/str_format.h"
 #include "grpcpp/channel.h"
@@ -14,13 +15,18 @@ constexpr size_t kChunkBytes = 1024 * 1024 - 1024;
 
 }  // namespace
 
-GrpcConnection::GrpcConnection(const std::shared_ptr<grpc::Channel>& channel, const RetryPolicy& policy)
-    : retrier_(policy),
-      meshing_(v1::MeshingService::NewStub(channel)),
-      sessions_(v1::SessionService::NewStub(channel)),
-      operations_(v1::OperationService::NewStub(channel)),
-      queries_(v1::QueryService::NewStub(channel)),
-      health_(grpc::health::v1::Health::NewStub(channel)) {}
+GrpcConnection::GrpcConnection(const std::shared_ptr<grpc::Channel>& channel, const RetryPolicy& policy,
+                               OpenChannelTo open)
+    : retrier_(policy), servers_(channel, std::move(open)) {}
+
+absl::Status GrpcConnection::RunOn(const std::string& name, const CallOptions& call, const AttemptAt& attempt_at) {
+  const std::string id = SessionIdOf(name);
+  return retrier_.Run(call.timeout, call.stop, [&](Attempt& attempt) {
+    attempt.SetSession(id);
+    const std::shared_ptr<const Server> server = servers_.Of(id);
+    return servers_.Follow(id, *server, attempt_at(*server, attempt), attempt);
+  });
+}
 
 size_t RowsOfARequest(size_t row) { return std::max<size_t>(1, kChunkBytes / sizeof(double) / row); }
 
@@ -32,8 +38,9 @@ std::string RequestIdOf(const CallOptions& call) {
   return absl::StrFormat("%08x%08x%08x%08x", random(), random(), random(), random());
 }
 
-std::shared_ptr<Connection> MakeConnection(std::shared_ptr<grpc::Channel> channel, const RetryPolicy& policy) {
-  return std::make_shared<GrpcConnection>(channel, policy);
+std::shared_ptr<Connection> MakeConnection(std::shared_ptr<grpc::Channel> channel, const RetryPolicy& policy,
+                                           OpenChannelTo open) {
+  return std::make_shared<GrpcConnection>(channel, policy, std::move(open));
 }
 
 }  // namespace wellspace::client

@@ -8,19 +8,16 @@
 
 #include "client/connection.h"
 #include "client/grpc/retry.h"
-#include "grpc/health/v1/health.grpc.pb.h"
-#include "wellspace/v1/meshing.grpc.pb.h"
-#include "wellspace/v1/operations.grpc.pb.h"
-#include "wellspace/v1/queries.grpc.pb.h"
-#include "wellspace/v1/sessions.grpc.pb.h"
+#include "client/grpc/servers.h"
 
 namespace wellspace::client {
 
+using AttemptAt = std::function<absl::Status(const Server& server, Attempt& attempt)>;
 using FillSizesRequest = std::function<size_t(size_t first, v1::SetSizesRequest& request)>;
 
 class GrpcConnection final : public Connection {
  public:
-  GrpcConnection(const std::shared_ptr<grpc::Channel>& channel, const RetryPolicy& policy);
+  GrpcConnection(const std::shared_ptr<grpc::Channel>& channel, const RetryPolicy& policy, OpenChannelTo open);
 
   // meshing.cc
   absl::Status MeshPoints(const MeshOptions& options, std::span<const double> points, MeshSink& sink,
@@ -87,13 +84,28 @@ class GrpcConnection final : public Connection {
                                             const CallOptions& call) override;
 
  private:
-  // Makes a unary call until its status is final; the answer is in `response`.
+  // Makes a unary call of the first server until its status is final; the answer is in `response`.
   template <typename Stub, typename Request, typename Response>
   absl::Status Call(Stub& stub, grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
                     const Request& request, const CallOptions& call, Response* response) {
     return retrier_.Run(call.timeout, call.stop, [&](Attempt& attempt) {
       CallContext context(attempt);
       return FromGrpcStatus((stub.*method)(context.get(), request, response));
+    });
+  }
+
+  // Makes attempts at a call on the session of `name`, each at the server that has it as far as is known. `name`: of a
+  // session, or of an operation.
+  absl::Status RunOn(const std::string& name, const CallOptions& call, const AttemptAt& attempt_at);
+
+  // A unary call so.
+  template <typename Stub, typename Request, typename Response>
+  absl::Status CallOn(const std::string& name, const std::unique_ptr<Stub> Server::*stub,
+                      grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
+                      const Request& request, const CallOptions& call, Response* response) {
+    return RunOn(name, call, [&](const Server& server, Attempt& attempt) {
+      CallContext context(attempt);
+      return FromGrpcStatus((*(server.*stub).*method)(context.get(), request, response));
     });
   }
 
@@ -104,16 +116,12 @@ class GrpcConnection final : public Connection {
   // One request of AddVertices.
   absl::StatusOr<AddedVertices> AddSome(const v1::AddVerticesRequest& request, const CallOptions& call);
 
-  // One attempt at GetSession.
-  absl::StatusOr<v1::Session> FetchSession(const std::string& session, const Attempt& attempt);
-
   Retrier retrier_;
-  const std::unique_ptr<v1::MeshingService::Stub> meshing_;
-  const std::unique_ptr<v1::SessionService::Stub> sessions_;
-  const std::unique_ptr<v1::OperationService::Stub> operations_;
-  const std::unique_ptr<v1::QueryService::Stub> queries_;
-  const std::unique_ptr<grpc::health::v1::Health::Stub> health_;
+  Servers servers_;
 };
+
+// One attempt at GetSession.
+absl::StatusOr<v1::Session> FetchSession(const std::string& session, const Server& server, const Attempt& attempt);
 
 // The options of the requests that a call makes one after the other: together they take no longer than it may.
 class CallInParts {

@@ -103,7 +103,7 @@ absl::Status GrpcConnection::MeshPoints(const MeshOptions& options, std::span<co
   const int dimension = std::max(1, options.dimension);
   return retrier_.Run(call.timeout, call.stop, [&](Attempt& attempt) {
     CallContext context(attempt);
-    const std::unique_ptr<MeshPointsStream> stream = meshing_->MeshPoints(context.get());
+    const std::unique_ptr<MeshPointsStream> stream = servers_.first().meshing->MeshPoints(context.get());
     // Points go up while answers come down: the server may fail the call before it has all.
     v1::MeshPointsRequest first;
     first.set_with_boundary(sink.WantsBoundary());
@@ -144,7 +144,7 @@ absl::StatusOr<MeshEstimate> GrpcConnection::EstimateMesh(const MeshOptions& opt
   const absl::Status status = retrier_.Run(call.timeout, call.stop, [&](Attempt& attempt) {
     CallContext context(attempt);
     RequestWriter<v1::EstimateMeshRequest> stream([&](grpc::CompletionQueue* queue) {
-      return meshing_->PrepareAsyncEstimateMesh(context.get(), &response, queue);
+      return servers_.first().meshing->PrepareAsyncEstimateMesh(context.get(), &response, queue);
     });
     SendCloud(options, points, v1::EstimateMeshRequest(), stream);
     return FromGrpcStatus(stream.Finish());
@@ -160,8 +160,8 @@ absl::StatusOr<MeshEstimate> GrpcConnection::EstimateMesh(const MeshOptions& opt
 
 absl::StatusOr<ServerInfo> GrpcConnection::GetServerInfo(const CallOptions& call) {
   v1::GetServerInfoResponse response;
-  WELLSPACE_RETURN_IF_ERROR(
-      Call(*meshing_, &v1::MeshingService::Stub::GetServerInfo, v1::GetServerInfoRequest(), call, &response));
+  WELLSPACE_RETURN_IF_ERROR(Call(*servers_.first().meshing, &v1::MeshingService::Stub::GetServerInfo,
+                                 v1::GetServerInfoRequest(), call, &response));
   return InfoFromProto(response);
 }
 
@@ -169,7 +169,8 @@ absl::StatusOr<Health> GrpcConnection::CheckHealth(const std::string& service, c
   grpc::health::v1::HealthCheckRequest request;
   request.set_service(service);
   grpc::health::v1::HealthCheckResponse response;
-  WELLSPACE_RETURN_IF_ERROR(Call(*health_, &grpc::health::v1::Health::Stub::Check, request, call, &response));
+  WELLSPACE_RETURN_IF_ERROR(
+      Call(*servers_.first().health, &grpc::health::v1::Health::Stub::Check, request, call, &response));
   switch (response.status()) {
     case grpc::health::v1::HealthCheckResponse::SERVING:
       return Health::kServing;

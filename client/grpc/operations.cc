@@ -17,7 +17,8 @@ absl::StatusOr<Operation> GrpcConnection::StartRefinement(const std::string& ses
   request.set_request_id(RequestIdOf(call));
   SetExpectedRevision(call.expected_revision, request);
   v1::StartRefinementResponse response;
-  WELLSPACE_RETURN_IF_ERROR(Call(*operations_, &v1::OperationService::Stub::StartRefinement, request, call, &response));
+  WELLSPACE_RETURN_IF_ERROR(
+      CallOn(session, &Server::operations, &v1::OperationService::Stub::StartRefinement, request, call, &response));
   return OperationFromProto(response.operation());
 }
 
@@ -25,7 +26,8 @@ absl::StatusOr<Operation> GrpcConnection::GetOperation(const std::string& operat
   v1::GetOperationRequest request;
   request.set_name(operation);
   v1::GetOperationResponse response;
-  WELLSPACE_RETURN_IF_ERROR(Call(*operations_, &v1::OperationService::Stub::GetOperation, request, call, &response));
+  WELLSPACE_RETURN_IF_ERROR(
+      CallOn(operation, &Server::operations, &v1::OperationService::Stub::GetOperation, request, call, &response));
   return OperationFromProto(response.operation());
 }
 
@@ -38,7 +40,8 @@ absl::StatusOr<OperationPage> GrpcConnection::ListOperations(const std::string& 
   }
   request.set_page_token(page.page_token);
   v1::ListOperationsResponse response;
-  WELLSPACE_RETURN_IF_ERROR(Call(*operations_, &v1::OperationService::Stub::ListOperations, request, call, &response));
+  WELLSPACE_RETURN_IF_ERROR(
+      CallOn(session, &Server::operations, &v1::OperationService::Stub::ListOperations, request, call, &response));
   OperationPage result;
   for (const v1::Operation& operation : response.operations()) {
     result.operations.push_back(OperationFromProto(operation));
@@ -52,7 +55,8 @@ absl::StatusOr<Operation> GrpcConnection::CancelOperation(const std::string& ope
   v1::CancelOperationRequest request;
   request.set_name(operation);
   v1::CancelOperationResponse response;
-  WELLSPACE_RETURN_IF_ERROR(Call(*operations_, &v1::OperationService::Stub::CancelOperation, request, call, &response));
+  WELLSPACE_RETURN_IF_ERROR(
+      CallOn(operation, &Server::operations, &v1::OperationService::Stub::CancelOperation, request, call, &response));
   return OperationFromProto(response.operation());
 }
 
@@ -60,7 +64,7 @@ absl::StatusOr<Operation> GrpcConnection::WatchOperation(const std::string& oper
                                                          std::optional<uint64_t> after_sequence,
                                                          const CallOptions& call) {
   std::optional<Operation> ended;
-  const absl::Status status = retrier_.Run(call.timeout, call.stop, [&](Attempt& attempt) {
+  const absl::Status status = RunOn(operation, call, [&](const Server& server, Attempt& attempt) {
     v1::WatchOperationRequest request;
     request.set_name(operation);
     if (after_sequence.has_value()) {
@@ -68,7 +72,7 @@ absl::StatusOr<Operation> GrpcConnection::WatchOperation(const std::string& oper
     }
     CallContext context(attempt);
     const std::unique_ptr<grpc::ClientReader<v1::WatchOperationResponse>> stream =
-        operations_->WatchOperation(context.get(), request);
+        server.operations->WatchOperation(context.get(), request);
     v1::WatchOperationResponse response;
     while (stream->Read(&response)) {
       attempt.NoteProgress();

@@ -36,19 +36,20 @@ constexpr double kMostCoordinate = 1 + 1e-9;
 // Makes as many calls as the vertices take, and goes on after the last answered vertex when a connection breaks off.
 // Answers of a call about all vertices are not counted beforehand: it is repeated only as long as nothing has come.
 //
-// `open` starts a call with a request of these vertices; `take` hands a response on, and says how many vertices it was
-// about.
+// `run` makes attempts at the server that has the session; `open` starts a call with a request of these vertices;
+// `take` hands a response on, and says how many vertices it was about.
 template <typename Request, typename Response>
-absl::Status StreamAnswers(
-    Retrier& retrier, Request request, std::span<const uint32_t> vertices, const CallOptions& call,
-    const std::function<std::unique_ptr<grpc::ClientReader<Response>>(grpc::ClientContext*, const Request&)>& open,
-    const std::function<absl::StatusOr<size_t>(const Response&)>& take) {
+absl::Status StreamAnswers(Request request, std::span<const uint32_t> vertices, const CallOptions& call,
+                           const std::function<absl::Status(const CallOptions&, const AttemptAt&)>& run,
+                           const std::function<std::unique_ptr<grpc::ClientReader<Response>>(
+                               const Server&, grpc::ClientContext*, const Request&)>& open,
+                           const std::function<absl::StatusOr<size_t>(const Response&)>& take) {
   const bool all = vertices.empty();
   size_t answered = 0;
-  const auto answer_part = [&](size_t end, Attempt& attempt) -> absl::Status {
+  const auto answer_part = [&](size_t end, const Server& server, Attempt& attempt) -> absl::Status {
     request.mutable_vertices()->Assign(vertices.begin() + (all ? 0 : answered), vertices.begin() + end);
     CallContext context(attempt);
-    const std::unique_ptr<grpc::ClientReader<Response>> stream = open(context.get(), request);
+    const std::unique_ptr<grpc::ClientReader<Response>> stream = open(server, context.get(), request);
     absl::Status damage;
     Response response;
     while (damage.ok() && stream->Read(&response)) {
@@ -76,11 +77,11 @@ absl::Status StreamAnswers(
     }
     return all ? absl::OkStatus() : attempt.Final(Contradiction(answered, " of ", end, " vertices"));
   };
-  const absl::Duration deadline = SinceBoot() + call.timeout;
+  CallInParts parts(call);
   do {
     const size_t end = std::min(vertices.size(), answered + kVerticesOfARequest);
     WELLSPACE_RETURN_IF_ERROR(
-        retrier.Run(deadline - SinceBoot(), call.stop, [&](Attempt& attempt) { return answer_part(end, attempt); }));
+        run(parts.Next(), [&](const Server& server, Attempt& attempt) { return answer_part(end, server, attempt); }));
   } while (!all && answered < vertices.size());
   return absl::OkStatus();
 }
@@ -203,9 +204,10 @@ absl::Status GrpcConnection::ApproximateNearestNeighbors(const std::string& sess
   v1::ApproximateNearestNeighborsRequest request;
   request.set_name(session);
   return StreamAnswers<v1::ApproximateNearestNeighborsRequest, v1::ApproximateNearestNeighborsResponse>(
-      retrier_, request, vertices, call,
-      [this](grpc::ClientContext* context, const v1::ApproximateNearestNeighborsRequest& part) {
-        return queries_->ApproximateNearestNeighbors(context, part);
+      request, vertices, call,
+      [&](const CallOptions& part, const AttemptAt& attempt_at) { return RunOn(session, part, attempt_at); },
+      [](const Server& server, grpc::ClientContext* context, const v1::ApproximateNearestNeighborsRequest& part) {
+        return server.queries->ApproximateNearestNeighbors(context, part);
       },
       [&on_distances](const v1::ApproximateNearestNeighborsResponse& response) -> absl::StatusOr<size_t> {
         const size_t count = response.distances_size();
@@ -223,9 +225,10 @@ absl::Status GrpcConnection::ClippedVoronoiCells(const std::string& session, std
   request.set_name(session);
   request.set_beta(beta);
   return StreamAnswers<v1::ClippedVoronoiCellsRequest, v1::ClippedVoronoiCellsResponse>(
-      retrier_, request, vertices, call,
-      [this](grpc::ClientContext* context, const v1::ClippedVoronoiCellsRequest& part) {
-        return queries_->ClippedVoronoiCells(context, part);
+      request, vertices, call,
+      [&](const CallOptions& part, const AttemptAt& attempt_at) { return RunOn(session, part, attempt_at); },
+      [](const Server& server, grpc::ClientContext* context, const v1::ClippedVoronoiCellsRequest& part) {
+        return server.queries->ClippedVoronoiCells(context, part);
       },
       HandOn<v1::ClippedVoronoiCellsResponse>(on_cells));
 }
@@ -235,9 +238,10 @@ absl::Status GrpcConnection::VoronoiCells(const std::string& session, std::span<
   v1::VoronoiCellsRequest request;
   request.set_name(session);
   return StreamAnswers<v1::VoronoiCellsRequest, v1::VoronoiCellsResponse>(
-      retrier_, request, vertices, call,
-      [this](grpc::ClientContext* context, const v1::VoronoiCellsRequest& part) {
-        return queries_->VoronoiCells(context, part);
+      request, vertices, call,
+      [&](const CallOptions& part, const AttemptAt& attempt_at) { return RunOn(session, part, attempt_at); },
+      [](const Server& server, grpc::ClientContext* context, const v1::VoronoiCellsRequest& part) {
+        return server.queries->VoronoiCells(context, part);
       },
       HandOn<v1::VoronoiCellsResponse>(on_cells));
 }
@@ -261,7 +265,8 @@ absl::StatusOr<Located> GrpcConnection::Locate(const std::string& session, std::
     request.mutable_points()->Assign(part.begin(), part.end());
     request.set_point_offset(done / dimension);
     v1::LocateResponse response;
-    WELLSPACE_RETURN_IF_ERROR(Call(*queries_, &v1::QueryService::Stub::Locate, request, parts.Next(), &response));
+    WELLSPACE_RETURN_IF_ERROR(
+        CallOn(session, &Server::queries, &v1::QueryService::Stub::Locate, request, parts.Next(), &response));
     WELLSPACE_RETURN_IF_ERROR(CheckLocated(request, part.size() / dimension, dimension, response));
     located.simplices.insert(located.simplices.end(), response.simplices().begin(), response.simplices().end());
     located.vertices.insert(located.vertices.end(), response.vertices().begin(), response.vertices().end());
@@ -309,7 +314,8 @@ absl::StatusOr<AddedVertices> GrpcConnection::AddVertices(const std::string& ses
 
 absl::StatusOr<AddedVertices> GrpcConnection::AddSome(const v1::AddVerticesRequest& request, const CallOptions& call) {
   v1::AddVerticesResponse response;
-  WELLSPACE_RETURN_IF_ERROR(Call(*queries_, &v1::QueryService::Stub::AddVertices, request, call, &response));
+  WELLSPACE_RETURN_IF_ERROR(
+      CallOn(request.name(), &Server::queries, &v1::QueryService::Stub::AddVertices, request, call, &response));
   const auto count = static_cast<size_t>(response.vertices_size());
   const auto coordinates = static_cast<size_t>(request.points_size());
   const auto near = static_cast<size_t>(request.near_size());

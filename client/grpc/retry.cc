@@ -24,6 +24,12 @@ namespace {
 // Its message begins so.
 constexpr char kReaderStalled[] = "READER_STALLED";
 
+// The key by which proxies send all calls on a session to one server.
+constexpr char kSessionMetadata[] = "wellspace-session";
+
+// Servers that send a client to and fro do not agree yet which of them has the session.
+constexpr int kMostRedirects = 4;
+
 absl::Status CancelledByCaller() { return absl::CancelledError("cancelled by the caller"); }
 
 // Longer waits, which a server may ask for, would overflow the clock of the standard library.
@@ -71,15 +77,19 @@ CallContext::CallContext(const Attempt& attempt) : cancel_(attempt.stop(), [this
     // gRPC goes by its own clock from here on, which does not jump either.
     context_.set_deadline(absl::ToChronoTime(absl::Now() + attempt.time_left()));
   }
+  if (!attempt.session().empty()) {
+    context_.AddMetadata(kSessionMetadata, attempt.session());
+  }
 }
 
 absl::Status Retrier::Run(absl::Duration timeout, const std::stop_token& stop,
                           const std::function<absl::Status(Attempt&)>& attempt) {
   const absl::Duration deadline = SinceBoot() + timeout;
+  int redirects = 0;  // in a row
   for (int failures = 0;;) {
     Attempt current(deadline - SinceBoot(), stop);
     absl::Status status = attempt(current);
-    if (current.progressed() || status.code() != absl::StatusCode::kUnavailable) {
+    if (current.progressed() || status.code() != absl::StatusCode::kUnavailable || !ReasonOf(status).empty()) {
       reached_.store(true);
     }
     if (current.is_final() || status.ok()) {
@@ -88,7 +98,13 @@ absl::Status Retrier::Run(absl::Duration timeout, const std::stop_token& stop,
     if (status.code() == absl::StatusCode::kCancelled && stop.stop_requested()) {
       return CancelledByCaller();
     }
-    failures = current.progressed() ? 1 : failures + 1;
+    failures = current.progressed() ? 0 : failures;
+    if (current.is_redirected() && redirects < kMostRedirects) {
+      ++redirects;
+      continue;
+    }
+    redirects = 0;
+    ++failures;
     const std::optional<absl::Duration> delay = DelayBeforeRetry(policy_,
                                                                  {.status = status,
                                                                   .failures = failures,

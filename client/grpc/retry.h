@@ -5,6 +5,7 @@
 #include <atomic>
 #include <functional>
 #include <stop_token>
+#include <string>
 #include <utility>
 
 #include "absl/status/status.h"
@@ -34,6 +35,10 @@ class Attempt {
   absl::Duration time_left() const { return time_left_; }
   const std::stop_token& stop() const { return stop_; }
 
+  // The id of the session that the call is about, for proxies; empty: none.
+  void SetSession(std::string id) { session_ = std::move(id); }
+  const std::string& session() const { return session_; }
+
   // The server has answered with something that the call keeps.
   void NoteProgress() { progressed_ = true; }
   bool progressed() const { return progressed_; }
@@ -45,6 +50,10 @@ class Attempt {
   }
   bool is_final() const { return is_final_; }
 
+  // The next attempt is made at another server, which has what this one has not: at once.
+  void SetRedirected() { is_redirected_ = true; }
+  bool is_redirected() const { return is_redirected_; }
+
   // The status of this attempt is worth another, though IsWorthRepeating does not say so.
   void SetWorthRepeating() { is_worth_repeating_ = true; }
   bool is_worth_repeating() const { return is_worth_repeating_; }
@@ -52,12 +61,15 @@ class Attempt {
  private:
   const absl::Duration time_left_;
   const std::stop_token stop_;
+  std::string session_;
   bool progressed_ = false;
   bool is_final_ = false;
+  bool is_redirected_ = false;
   bool is_worth_repeating_ = false;
 };
 
-// The context of one call of an attempt, with its deadline; cancelled when a stop is asked for.
+// The context of one call of an attempt, with its deadline and, in the metadata, its session; cancelled when a stop is
+// asked for.
 class CallContext {
  public:
   explicit CallContext(const Attempt& attempt);
@@ -78,7 +90,8 @@ class Retrier {
   explicit Retrier(const RetryPolicy& policy) : policy_(policy) {}
 
   // Calls `attempt` until one is final, succeeds or fails with an error that is not worth repeating; at most as often
-  // as the policy says, and until `timeout` has passed.
+  // as the policy says, and until `timeout` has passed. An attempt that was redirected is no failure, but of more than
+  // four in a row.
   // Errors:     the last attempt's; CANCELLED "cancelled by the caller" when `stop` asked for it.
   absl::Status Run(absl::Duration timeout, const std::stop_token& stop,
                    const std::function<absl::Status(Attempt&)>& attempt);

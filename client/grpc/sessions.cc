@@ -16,23 +16,24 @@ absl::StatusOr<Session> GrpcConnection::CreateSession(const SessionOptions& opti
   }
   request.set_request_id(RequestIdOf(call));
   v1::CreateSessionResponse response;
-  WELLSPACE_RETURN_IF_ERROR(Call(*sessions_, &v1::SessionService::Stub::CreateSession, request, call, &response));
+  WELLSPACE_RETURN_IF_ERROR(
+      Call(*servers_.first().sessions, &v1::SessionService::Stub::CreateSession, request, call, &response));
   return SessionFromProto(response.session());
 }
 
-absl::StatusOr<v1::Session> GrpcConnection::FetchSession(const std::string& session, const Attempt& attempt) {
+absl::StatusOr<v1::Session> FetchSession(const std::string& session, const Server& server, const Attempt& attempt) {
   v1::GetSessionRequest request;
   request.set_name(session);
   v1::GetSessionResponse response;
   CallContext context(attempt);
-  WELLSPACE_RETURN_IF_ERROR(FromGrpcStatus(sessions_->GetSession(context.get(), request, &response)));
+  WELLSPACE_RETURN_IF_ERROR(FromGrpcStatus(server.sessions->GetSession(context.get(), request, &response)));
   return response.session();
 }
 
 absl::StatusOr<Session> GrpcConnection::GetSession(const std::string& session, const CallOptions& call) {
   absl::StatusOr<v1::Session> found;
-  const absl::Status status = retrier_.Run(call.timeout, call.stop, [&](Attempt& attempt) {
-    found = FetchSession(session, attempt);
+  const absl::Status status = RunOn(session, call, [&](const Server& server, Attempt& attempt) {
+    found = FetchSession(session, server, attempt);
     return found.status();
   });
   if (!status.ok()) {
@@ -50,7 +51,8 @@ absl::StatusOr<SessionPage> GrpcConnection::ListSessions(const Labels& labels, c
   request.set_page_token(page.page_token);
   request.mutable_labels()->insert(labels.begin(), labels.end());
   v1::ListSessionsResponse response;
-  WELLSPACE_RETURN_IF_ERROR(Call(*sessions_, &v1::SessionService::Stub::ListSessions, request, call, &response));
+  WELLSPACE_RETURN_IF_ERROR(
+      Call(*servers_.first().sessions, &v1::SessionService::Stub::ListSessions, request, call, &response));
   SessionPage result;
   for (const v1::Session& session : response.sessions()) {
     WELLSPACE_ASSIGN_OR_RETURN(Session one, SessionFromProto(session));
@@ -77,7 +79,8 @@ absl::StatusOr<Session> GrpcConnection::UpdateSession(const std::string& session
   request.set_request_id(RequestIdOf(call));
   SetExpectedRevision(call.expected_revision, request);
   v1::UpdateSessionResponse response;
-  WELLSPACE_RETURN_IF_ERROR(Call(*sessions_, &v1::SessionService::Stub::UpdateSession, request, call, &response));
+  WELLSPACE_RETURN_IF_ERROR(
+      CallOn(session, &Server::sessions, &v1::SessionService::Stub::UpdateSession, request, call, &response));
   return SessionFromProto(response.session());
 }
 
@@ -89,7 +92,8 @@ absl::StatusOr<PointsLeft> GrpcConnection::RemovePoints(const std::string& sessi
   request.set_request_id(RequestIdOf(call));
   SetExpectedRevision(call.expected_revision, request);
   v1::RemovePointsResponse response;
-  WELLSPACE_RETURN_IF_ERROR(Call(*sessions_, &v1::SessionService::Stub::RemovePoints, request, call, &response));
+  WELLSPACE_RETURN_IF_ERROR(
+      CallOn(session, &Server::sessions, &v1::SessionService::Stub::RemovePoints, request, call, &response));
   return PointsLeft{.point_count = response.committed_points(), .revision = response.revision()};
 }
 
@@ -99,7 +103,7 @@ absl::Status GrpcConnection::DeleteSession(const std::string& session, const Cal
   request.set_request_id(RequestIdOf(call));
   SetExpectedRevision(call.expected_revision, request);
   v1::DeleteSessionResponse response;
-  return Call(*sessions_, &v1::SessionService::Stub::DeleteSession, request, call, &response);
+  return CallOn(session, &Server::sessions, &v1::SessionService::Stub::DeleteSession, request, call, &response);
 }
 
 }  // namespace wellspace::client

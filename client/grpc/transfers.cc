@@ -116,7 +116,8 @@ absl::Status Upload::Run(v1::SessionService::Stub& stub, const v1::Session& sess
   request.set_name(session.name());
   request.set_point_offset(*offset_ + first);
   // The commits of the attempts before this one have changed the revision.
-  SetExpectedRevision(std::exchange(expected_revision_, std::nullopt), request);
+  const std::optional<uint64_t> expected = std::exchange(expected_revision_, std::nullopt);
+  SetExpectedRevision(expected, request);
   CallContext context(attempt);
   Stream stream(
       [&](grpc::CompletionQueue* queue) { return stub.PrepareAsyncUploadPoints(context.get(), &response_, queue); });
@@ -132,6 +133,9 @@ absl::Status Upload::Run(v1::SessionService::Stub& stub, const v1::Session& sess
     return attempt.Final(
         absl::DataLossError(absl::StrCat("the server has ", response_.committed_points(),
                                          " points after points up to number ", request.point_offset(), " were sent")));
+  }
+  if (!OwnerAddressOf(status).empty()) {
+    expected_revision_ = expected;  // a server that has not the session commits nothing
   }
   // The server may not have noticed yet that the last attempt broke off.
   if (attempts_++ > 0 && ReasonOf(status) == "ERROR_REASON_SESSION_BUSY") {
@@ -177,10 +181,11 @@ absl::StatusOr<SizesSet> GrpcConnection::SetVertexSizes(const std::string& sessi
 absl::StatusOr<SizesSet> GrpcConnection::SendAllSizes(const std::string& session, size_t count, const CallOptions& call,
                                                       const FillSizesRequest& fill) {
   v1::SetSizesResponse response;
-  const absl::Status status = retrier_.Run(call.timeout, call.stop, [&](Attempt& attempt) {
+  const absl::Status status = RunOn(session, call, [&](const Server& server, Attempt& attempt) {
     CallContext context(attempt);
-    RequestWriter<v1::SetSizesRequest> stream(
-        [&](grpc::CompletionQueue* queue) { return sessions_->PrepareAsyncSetSizes(context.get(), &response, queue); });
+    RequestWriter<v1::SetSizesRequest> stream([&](grpc::CompletionQueue* queue) {
+      return server.sessions->PrepareAsyncSetSizes(context.get(), &response, queue);
+    });
     // Also after one that may have been taken: the same sizes are no change, whatever the revision is then.
     SendSizes(session, call.expected_revision, count, fill, stream);
     return FromGrpcStatus(stream.Finish());
@@ -195,9 +200,9 @@ absl::StatusOr<Uploaded> GrpcConnection::UploadPoints(const std::string& session
                                                       std::optional<uint64_t> offset, const OnPoints& on_points,
                                                       const CallOptions& call) {
   Upload upload(source, offset, on_points, call);
-  const absl::Status status = retrier_.Run(call.timeout, call.stop, [&](Attempt& attempt) {
-    const absl::StatusOr<v1::Session> found = FetchSession(session, attempt);
-    return found.ok() ? upload.Run(*sessions_, *found, attempt) : found.status();
+  const absl::Status status = RunOn(session, call, [&](const Server& server, Attempt& attempt) {
+    const absl::StatusOr<v1::Session> found = FetchSession(session, server, attempt);
+    return found.ok() ? upload.Run(*server.sessions, *found, attempt) : found.status();
   });
   if (!status.ok()) {
     return status;
@@ -208,7 +213,7 @@ absl::StatusOr<Uploaded> GrpcConnection::UploadPoints(const std::string& session
 absl::Status GrpcConnection::DownloadMesh(const std::string& session, MeshSink& sink, std::optional<uint64_t> revision,
                                           const OnChunks& on_chunks, const CallOptions& call) {
   MeshReceiver receiver(sink, {.dimension = std::nullopt, .input_points = std::nullopt});
-  return retrier_.Run(call.timeout, call.stop, [&](Attempt& attempt) {
+  return RunOn(session, call, [&](const Server& server, Attempt& attempt) {
     v1::DownloadMeshRequest request;
     request.set_name(session);
     if (receiver.has_metadata()) {
@@ -222,7 +227,7 @@ absl::Status GrpcConnection::DownloadMesh(const std::string& session, MeshSink& 
     receiver.Continue();
     CallContext context(attempt);
     const std::unique_ptr<grpc::ClientReader<v1::DownloadMeshResponse>> stream =
-        sessions_->DownloadMesh(context.get(), request);
+        server.sessions->DownloadMesh(context.get(), request);
     absl::Status damage;
     v1::DownloadMeshResponse response;
     while (damage.ok() && stream->Read(&response)) {

@@ -135,7 +135,8 @@ class Update {
 absl::Status GrpcConnection::UpdateMesh(const std::string& session, Mesh& mesh, const OnChunks& on_chunks,
                                         const CallOptions& call) {
   Update update(session, mesh, on_chunks);
-  return retrier_.Run(call.timeout, call.stop, [&](Attempt& attempt) { return update.Run(*sessions_, attempt); });
+  return RunOn(session, call,
+               [&](const Server& server, Attempt& attempt) { return update.Run(*server.sessions, attempt); });
 }
 
 }  // namespace wellspace::client

@@ -117,7 +117,11 @@ class ScriptedServer final : public grpc::CallbackGenericService {
     grpc::ServerBuilder builder;
     builder.RegisterCallbackGenericService(this);
     server_ = builder.BuildAndStart();
-    connection_ = client::MakeConnection(server_->InProcessChannel({}), kPolicy);
+    // Whatever address it names is its own.
+    connection_ =
+        client::MakeConnection(server_->InProcessChannel({}), kPolicy, [this](const std::string& /*address*/) {
+          return absl::StatusOr<std::shared_ptr<grpc::Channel>>(server_->InProcessChannel({}));
+        });
   }
 
   Script& script() { return script_; }

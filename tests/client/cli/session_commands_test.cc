@@ -13,6 +13,7 @@
 #include "tests/client/cli/closed_port.h"
 #include "tests/client/cli/process.h"
 #include "tests/client/cli/session_fixture.h"
+#include "tests/client/grpc/replica.h"
 
 namespace wellspace {
 namespace {
@@ -49,6 +50,25 @@ TEST(SessionCommandsWithoutServer, SayWhatTheyNeed) {
     EXPECT_THAT(result.err, AllOf(HasSubstr(command[0]), HasSubstr("needs a server: give --server HOST:PORT, or set "
                                                                    "WELLSPACE_SERVER")));
   }
+}
+
+TEST_F(SessionCommandsTest, GoToTheServerThatHasTheSession) {
+  client::FakeServer other;
+  other.sessions.get = server_.sessions.get;
+  server_.sessions.get = [&other](const v1::GetSessionRequest& /*request*/, v1::GetSessionResponse& /*response*/) {
+    return client::Elsewhere(other.address());
+  };
+  const RunResult shown = Run({"session", "show", kSession});
+  EXPECT_EQ(shown.exit_code, 0) << shown.err;
+  EXPECT_THAT(shown.out, HasSubstr(kSession));
+  const RunResult stayed = Run({"session", "show", kSession, "--no-follow", "--timeout", "0.5"});
+  EXPECT_NE(stayed.exit_code, 0);
+  EXPECT_THAT(stayed.err, HasSubstr("the session is elsewhere"));
+  const RunResult told =
+      RunWellspace({"session", "show", kSession, "--timeout", "0.5"},
+                   {.input = "", .environment = {"WELLSPACE_SERVER=" + server_.address(), "WELLSPACE_NO_FOLLOW=1"}});
+  EXPECT_NE(told.exit_code, 0);
+  EXPECT_THAT(told.err, HasSubstr("the session is elsewhere"));
 }
 
 TEST_F(SessionCommandsTest, CreatePrintsTheName) {

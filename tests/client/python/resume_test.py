@@ -241,7 +241,7 @@ class ResumeTest(BreakerCase):
         self.client.is_serving()
         with self.fails(UnavailableError):
             self.client.info()
-        self.assertEqual(self.breaker.count("GetServerInfo"), 11)
+        self.assertEqual(self.breaker.count("GetServerInfo"), 12)
 
     def test_what_is_not_worth_it(self):
         def refuse(name, call, message, data):

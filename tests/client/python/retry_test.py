@@ -103,6 +103,18 @@ class RetrierTest(unittest.TestCase):
         busy = (LimitError("busy"), {"is_worth_repeating": True})
         self.assertEqual(self.run_with(busy, "done"), ("done", 0))
 
+    def test_redirects_are_no_failures(self):
+        redirected = {"is_redirected": True}
+        outcomes = [(UnavailableError(str(n), reason="SESSION_ELSEWHERE"), redirected) for n in range(10)]
+        self.assertEqual(self.run_with(*outcomes[:4], "done"), ("done", 0))
+        self.assertEqual(self.waited, [])
+        self.assertEqual(self.run_with(*outcomes, "done"), ("done", 0))
+        self.assertEqual(self.waited, [1, 2], "after four in a row, each fifth")
+
+    def test_what_is_final_is_not_redirected(self):
+        with self.assertRaisesRegex(UnavailableError, "here"):
+            self.run_with((UnavailableError("here"), {"is_redirected": True, "is_final": True}), "never")
+
     def test_ends_when_the_token_is_cancelled(self):
         self.token.cancel()
         with self.assertRaisesRegex(CancelledError, "by the caller"):

@@ -81,6 +81,7 @@ class Breaker(grpc.GenericRpcHandler):
         self._channel, self._metadata = client._channel, client._calls._context(_NoDeadline())["metadata"]
         self.on_request = self.on_answer = lambda method, call, message, data: data
         self.calls = []  # the names of methods
+        self.metadata = []  # of each call, a dict
         self._server = grpc.server(futures.ThreadPoolExecutor(16), handlers=[self])
         self.address = f"127.0.0.1:{self._server.add_insecure_port('127.0.0.1:0')}"
         self._server.start()
@@ -97,6 +98,7 @@ class Breaker(grpc.GenericRpcHandler):
         def handle(requests, context):
             number = self.count(method)
             self.calls.append(method)
+            self.metadata.append(dict(details.invocation_metadata))
             broken = []
 
             def sent():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import math
+import re
 import uuid
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, TypeVar
@@ -39,6 +40,7 @@ class Link:
     channel: grpc.Channel
     credentials: Credentials
     is_gone: Callable[[float], bool]  # whether the server will never answer again, as is known within so many seconds
+    address: str = ""  # of one that another server has named
 
 
 # A connection that broke off may be the first sign of the end of a server of this process; its exit code is the next.
@@ -48,15 +50,28 @@ _SECONDS_TO_KNOW = 1.0
 class Calls:
     """Makes calls to a server. Thread-safe."""
 
-    def __init__(self, link: Link, retrier: Retrier, renew: Callable[[Link], Link] | None = None) -> None:
-        """`renew` gets another server in the place of that of a link which is gone."""
-        self._link = link
+    def __init__(
+        self,
+        link: Link,
+        retrier: Retrier,
+        renew: Callable[[Link], Link] | None = None,
+        link_to: Callable[[str], Link] | None = None,
+        session: str = "",
+    ) -> None:
+        """`renew` gets another server in the place of that of a link which is gone.
+
+        `link_to` is the way to a server that another one has named as the owner of a session; None: it is not gone.
+        `session` is the id of the session that all calls are about, if they are about one.
+        """
+        self._first = self._link = link
         self._renew = renew
+        self._link_to = link_to
+        self._session = session
         self._retrier = retrier
 
-    def to_this_server(self) -> Calls:
-        """The same, to no other server: for sessions, which end with it."""
-        return Calls(self._link, self._retrier)
+    def of_session(self, name: str) -> Calls:
+        """The same for calls on a session, which go to the server that has it, and end with that of this process."""
+        return Calls(self._link, self._retrier, None, self._link_to, session_id(name))
 
     def run(self, options: CallOptions, make: Callable[[Attempt], T]) -> T:
         """Runs attempts until one succeeds.
@@ -76,7 +91,7 @@ class Calls:
             nonlocal has_renewed
             used = self._link
             try:
-                return make(attempt)
+                return self._make_where_it_is(make, attempt)
             except UnavailableError:
                 if attempt.is_final or not used.is_gone(_SECONDS_TO_KNOW):
                     raise
@@ -87,6 +102,27 @@ class Calls:
                 raise
 
         return self._retrier.run(deadline, options.cancel or CancelToken(), make_unless_gone)
+
+    def _make_where_it_is(self, make: Callable[[Attempt], T], attempt: Attempt) -> T:
+        """One attempt; where it says that another server has the session, or leaves that open, the next goes there."""
+        used = self._link
+        try:
+            return make(attempt)
+        except Error as error:
+            if self._link_to is None or not self._session:
+                raise
+            if _leaves_owner_open(error) and self._link is used:
+                self._link = self._first
+            if error.address:
+                try:
+                    self._link = self._link_to(error.address)
+                except Error as refused:
+                    raise attempt.final(refused) from error
+                attempt.is_redirected = True
+            elif used.address and not error.reason and error.code in ("UNAVAILABLE", "UNAUTHENTICATED"):
+                where = f"so it was at {used.address}, where the session is, as another server has said"
+                raise error.with_message(f"{error.message}; {where}") from None
+            raise
 
     def unary(self, method: str, request: Any, response: str, options: CallOptions) -> Any:
         """A call with one request and one answer, of the type `response`."""
@@ -143,6 +179,8 @@ class Calls:
     def _context(self, attempt: Attempt) -> dict[str, Any]:
         token = self._link.credentials.read_token()
         metadata = [] if token is None else [("authorization", f"Bearer {token}")]
+        if self._session:  # by which proxies send all calls on it to one server
+            metadata.append(("wellspace-session", self._session))
         return {"timeout": attempt.time_left(), "metadata": metadata}
 
     @staticmethod
@@ -155,6 +193,18 @@ class Calls:
         if code == "UNAVAILABLE" and not details and "handshake failed" in message.lower():
             return CredentialsError(f"the server's certificate is not trusted, or it speaks no TLS: {message}")
         return from_status(code, message, details)
+
+
+def session_id(name: str) -> str:
+    """The part of a session's name behind "sessions/"; empty for what is no such name."""
+    matched = re.fullmatch(r"sessions/([A-Za-z0-9._-]{1,128})", name)
+    return matched[1] if matched else ""
+
+
+def _leaves_owner_open(error: Error) -> bool:
+    """Whether `error` leaves open if its server still has the session."""
+    is_late = error.code == "DEADLINE_EXCEEDED" and not error.reason
+    return error.code == "UNAVAILABLE" or is_late or error.reason == "SESSION_NOT_FOUND"
 
 
 @contextlib.contextmanager

@@ -96,12 +96,37 @@ def host_of(address: str) -> str:
             "for TLS",
             field="server",
         )
-    matched = re.fullmatch(r"(\[[^\]/]+\]|[^/]+):(\d{1,5})", address)
+    matched = re.fullmatch(r"(\[[^\]/]+\]|[^/]+):([0-9]{1,5})", address)
     if matched is None or not 0 < int(matched[2]) < 65536:
         raise InvalidArgumentError(
             f"{address!r} is no address of a server; expected HOST:PORT with a port from 1 to 65535", field="server"
         )
     return matched[1].strip("[]")
+
+
+def host_of_named(address: str) -> str:
+    """The same of an address that a server has named: a name of DNS or a number, IPv6 in brackets, and a port."""
+    host = host_of(address)
+    try:
+        if address.startswith("["):
+            if "]:" not in address or ipaddress.IPv6Address(host).scope_id is not None:
+                raise ValueError
+        elif not _is_name_or_number(host) or len(host) > 253:
+            raise ValueError
+    except ValueError:
+        raise InvalidArgumentError(
+            "expected HOST:PORT, with the name of a host, its IPv4 address, or its IPv6 address in brackets"
+        ) from None
+    return host
+
+
+def _is_name_or_number(host: str) -> bool:
+    return re.fullmatch(r"[A-Za-z0-9._-]+", host) is not None
+
+
+def _target_of(address: str) -> str:
+    """HOST:PORT as gRPC takes it for that and nothing else: unix:7233 would be a file."""
+    return f"dns:///{address}" if _is_name_or_number(address.rpartition(":")[0]) else address
 
 
 def is_loopback(host: str) -> bool:
@@ -127,9 +152,9 @@ def open_channel(address: str, credentials: Credentials) -> grpc.Channel:
             _read_pem(credentials.tls_key, "tls_key"),
             _read_pem(credentials.tls_certificate, "tls_certificate"),
         )
-        return grpc.secure_channel(address, tls, options)
+        return grpc.secure_channel(_target_of(address), tls, options)
     if has_token and not credentials.insecure_remote and not is_loopback(host):
         raise WrongStateError(
             f"would send the token to {address} in plain text; use TLS, or allow it with insecure_remote=True"
         )
-    return grpc.insecure_channel(address, options)
+    return grpc.insecure_channel(_target_of(address), options)

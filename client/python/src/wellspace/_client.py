@@ -16,6 +16,7 @@ from ._mesh import Mesh, mesh_of
 from ._messages import messages_of, point_chunks, receive
 from ._parameters import SURFACE_NUMBERS, Parameters, fill, helpful_threads, split, takes
 from ._plane import PlaneArguments, make_plane
+from ._owners import Owners
 from ._progress import OnProgress, ProgressOption, progress_of, told
 from ._receiver import MeshReceiver
 from ._retry import Attempt, CancelToken, Retrier, RetryPolicy
@@ -51,6 +52,9 @@ class Client:
         Those to show the server, and those to be shown.
     retry : RetryPolicy
         The patience with the server.
+    follow : bool
+        Of several servers that share their sessions, calls on a session go to the one that has it, by the address that
+        the others name, with the same credentials. False: to this one alone, behind which a proxy finds the right one.
     """
 
     def __init__(
@@ -59,14 +63,21 @@ class Client:
         *,
         credentials: Credentials | None = None,
         retry: RetryPolicy | None = None,
+        follow: bool = True,
     ) -> None:
         if server is None and "WELLSPACE_SERVER" not in os.environ:
             server = shared_server()
         self._lock = threading.Lock()
         self._own = server if isinstance(server, LocalServer) else None
         link = self._open(server, credentials)
+        self._owners = Owners(self.address, link.credentials) if follow and self._own is None else None
         renews = self._own is not None and is_shared(self._own)
-        self._calls = Calls(link, Retrier(retry or RetryPolicy()), self._renew if renews else None)
+        self._calls = Calls(
+            link,
+            Retrier(retry or RetryPolicy()),
+            self._renew if renews else None,
+            self._owners.link_to if self._owners is not None else None,
+        )
 
     def _open(self, server: str | LocalServer | None, credentials: Credentials | None) -> Link:
         self.address, shown = _address_of(server, credentials)
@@ -88,6 +99,8 @@ class Client:
     def close(self) -> None:
         """Closes the connection; calls that are under way end with `CancelledError`."""
         self._channel.close()
+        if self._owners is not None:
+            self._owners.close()
 
     def __enter__(self) -> Client:
         return self

@@ -14,6 +14,9 @@ from .errors import CancelledError, Error
 
 T = TypeVar("T")
 
+# Servers that send a client to and fro do not agree yet which of them has the session.
+_MOST_REDIRECTS = 4
+
 
 @dataclasses.dataclass(frozen=True)
 class RetryPolicy:
@@ -24,7 +27,8 @@ class RetryPolicy:
     Attributes
     ----------
     max_attempts : int
-        Attempts in a row that may fail, with a server that has answered before; at least 1.
+        Attempts in a row that may fail, with a server that has answered before; at least 1. The default takes longer
+        than the 15 s after which another server takes over what one had that died.
     max_first_attempts : int
         The same with a server that has never answered: its address may be wrong.
     initial_backoff, multiplier, max_backoff : float
@@ -32,7 +36,7 @@ class RetryPolicy:
         is left out. A delay that the server asks for (`Error.retry_after`) is waited for in full.
     """
 
-    max_attempts: int = 8
+    max_attempts: int = 9
     max_first_attempts: int = 3
     initial_backoff: float = 0.2
     multiplier: float = 2.0
@@ -102,6 +106,7 @@ class Attempt:
         self.cancel = cancel
         self.progressed = False  # the server has answered with something that the call keeps
         self.is_final = False  # the outcome is the call's, whatever it is
+        self.is_redirected = False  # the next attempt is made at another server, at once
         self.is_worth_repeating = False  # another attempt may help, though the error does not say so
 
     def time_left(self) -> float | None:
@@ -132,8 +137,12 @@ class Retrier:
         self._is_server_known = False
 
     def run(self, deadline: float, cancel: CancelToken, make: Callable[[Attempt], T]) -> T:
-        """Calls `make` until it returns; raises the last error. `deadline` is one of `now`'s, or infinite."""
+        """Calls `make` until it returns; raises the last error. `deadline` is one of `now`'s, or infinite.
+
+        An attempt that was redirected is no failure, but of more than four in a row.
+        """
         failures = 0
+        redirects = 0  # in a row
         while True:
             if cancel.is_cancelled:
                 raise cancelled_by_caller()
@@ -143,15 +152,20 @@ class Retrier:
                 self._is_server_known = True
                 return result
             except Error as error:
-                wait = self._wait_after(error, attempt, failures)
+                failures = 0 if attempt.progressed else failures
+                wait = self._wait_after(error, attempt, failures + 1)
+                if attempt.is_redirected and not attempt.is_final and redirects < _MOST_REDIRECTS:
+                    redirects += 1
+                    continue
                 if wait is None:
                     raise
-            failures = 1 if attempt.progressed else failures + 1
+            redirects = 0
+            failures += 1
             if cancel._wait(wait):
                 raise cancelled_by_caller()
 
     def _wait_after(self, error: Error, attempt: Attempt, failures: int) -> float | None:
-        if attempt.progressed or error.code != "UNAVAILABLE":
+        if attempt.progressed or error.code != "UNAVAILABLE" or error.reason:
             self._is_server_known = True
         if attempt.is_final:
             return None
@@ -162,7 +176,7 @@ class Retrier:
         left = attempt.time_left()
         return self._policy.delay(
             error,
-            failures=1 if attempt.progressed else failures + 1,
+            failures=failures,
             is_server_known=self._is_server_known,
             time_left=math.inf if left is None else left,
             jitter=random.uniform(0.5, 1),

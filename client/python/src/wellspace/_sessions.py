@@ -90,7 +90,7 @@ class Session:
         self.name = name
         self.dimension = dimension
         self._was_interrupted = False  # a call that changes the session; the server may be at it
-        self._calls = client._calls.to_this_server()  # sessions end with it
+        self._calls = client._calls.of_session(name)
 
     @classmethod
     def attach(cls, name: str, *, server: Server = None, timeout: float | None = None) -> Session:

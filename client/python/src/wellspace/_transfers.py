@@ -59,7 +59,8 @@ class Upload:
             self._offset = committed
         # Points from the offset on have to be these: the server compares.
         first = min(max(self._offset, committed) - self._offset, len(self._cloud))
-        head = _api.message("UploadPointsRequest")(name=self._session, expected_revision=self._expected_revision)
+        expected = self._expected_revision
+        head = _api.message("UploadPointsRequest")(name=self._session, expected_revision=expected)
         # The commits of the attempts before this one have changed the revision.
         self._expected_revision = None
         if first > 0:
@@ -71,6 +72,8 @@ class Upload:
             upload = self._calls.attempt_upload
             answer = upload("SessionService/UploadPoints", requests, "UploadPointsResponse", attempt)
         except Error as error:
+            if error.address:
+                self._expected_revision = expected  # a server that has not the session commits nothing
             # The server may not have noticed yet that the last attempt broke off.
             attempt.is_worth_repeating = self._attempts > 1 and error.reason == "SESSION_BUSY"
             raise
@@ -108,10 +111,16 @@ class Addition:
 
     def _attempt(self, attempt: Attempt) -> None:
         requests = list(self._requests())
+        expected = self._expected_revision
         # The commits of an attempt before this one have changed the revision.
         self._expected_revision = None
         method = self._bounds.method
-        self._calls.attempt_upload(f"SessionService/{method}", requests, f"{method}Response", attempt)
+        try:
+            self._calls.attempt_upload(f"SessionService/{method}", requests, f"{method}Response", attempt)
+        except Error as error:
+            if error.address:
+                self._expected_revision = expected  # a server that has not the session commits nothing
+            raise
 
     def _requests(self) -> Iterator[bytes]:
         bounds = self._bounds

@@ -48,6 +48,9 @@ class Error(Exception):
         The argument of this package that `field` stands for, such as ``"size"``; empty if none does.
     retry_after : float or None
         Seconds after which the same call may succeed. None: trying again does not help, or nothing is known.
+    address : str
+        Of an error SESSION_ELSEWHERE: ``"HOST:PORT"`` of the server that has the session, as the one that was asked
+        has named it. Empty: it is not known, or another error.
     code : str
         The status code of gRPC, such as ``"INVALID_ARGUMENT"``.
     """
@@ -55,13 +58,21 @@ class Error(Exception):
     code = "UNKNOWN"
 
     def __init__(
-        self, message: str, *, reason: str = "", field: str = "", retry_after: float | None = None, code: str = ""
+        self,
+        message: str,
+        *,
+        reason: str = "",
+        field: str = "",
+        retry_after: float | None = None,
+        address: str = "",
+        code: str = "",
     ) -> None:
         super().__init__(message)
         self.message = message
         self.reason = reason
         self.field = field
         self.retry_after = retry_after
+        self.address = address
         if code:
             self.code = code
 
@@ -76,14 +87,17 @@ class Error(Exception):
 
     def with_message(self, message: str) -> Error:
         """The same error with another message."""
-        return _rebuild(type(self), message, self.reason, self.field, self.retry_after, self.code)
+        return _rebuild(type(self), message, self._details())
+
+    def _details(self) -> dict[str, Any]:
+        return {name: getattr(self, name) for name in ("reason", "field", "retry_after", "address", "code")}
 
     def __reduce__(self) -> Any:
-        return _rebuild, (type(self), self.message, self.reason, self.field, self.retry_after, self.code)
+        return _rebuild, (type(self), self.message, self._details())
 
 
-def _rebuild(kind: type[Error], message: str, reason: str, field: str, retry_after: float | None, code: str) -> Error:
-    return kind(message, reason=reason, field=field, retry_after=retry_after, code=code)
+def _rebuild(kind: type[Error], message: str, details: dict[str, Any]) -> Error:
+    return kind(message, **details)
 
 
 class InvalidArgumentError(Error, ValueError):
@@ -200,11 +214,11 @@ def printable(text: str) -> str:
 
 def from_status(code: str, message: str, details: bytes) -> Error:
     """The exception for a status of gRPC. `details` is a serialized google.rpc.Status, or empty."""
-    reason, field, retry_after = _read_details(details)
-    if not reason and message.startswith("READER_STALLED"):
-        reason = "READER_STALLED"
+    found = _read_details(details)
+    if not found.get("reason") and message.startswith("READER_STALLED"):
+        found["reason"] = "READER_STALLED"
     kind = _KINDS.get(code, CredentialsError if code == "PERMISSION_DENIED" else Error)
-    return kind(printable(message), reason=reason, field=field, retry_after=retry_after, code=code)
+    return kind(printable(message), code=code, **found)
 
 
 def from_message(status: Any) -> Error:
@@ -213,20 +227,24 @@ def from_message(status: Any) -> Error:
     return from_status(code, status.message, status.SerializeToString())
 
 
-def _read_details(serialized: bytes) -> tuple[str, str, float | None]:
-    reason, field, retry_after = "", "", None
+def _read_details(serialized: bytes) -> dict[str, Any]:
+    """The arguments of an Error that a serialized google.rpc.Status has."""
+    found: dict[str, Any] = {}
     try:
         details = _api.message("google.rpc.Status").FromString(serialized).details
         for detail in details:
             name = detail.type_url.rpartition("/")[2]
             if name == "google.rpc.ErrorInfo":
-                reason = _api.message(name).FromString(detail.value).reason.removeprefix("ERROR_REASON_")
+                info = _api.message(name).FromString(detail.value)
+                found["reason"] = info.reason.removeprefix("ERROR_REASON_")
+                if found["reason"] == "SESSION_ELSEWHERE" and "address" in info.metadata:
+                    found["address"] = info.metadata["address"]
             elif name == "google.rpc.BadRequest":
                 violations = _api.message(name).FromString(detail.value).field_violations
-                field = violations[0].field if violations else ""
+                found["field"] = violations[0].field if violations else ""
             elif name == "google.rpc.RetryInfo":
                 delay = _api.message(name).FromString(detail.value).retry_delay
-                retry_after = max(0.0, delay.seconds + delay.nanos * 1e-9)
+                found["retry_after"] = max(0.0, delay.seconds + delay.nanos * 1e-9)
     except Exception:  # of protobuf, which has several: other bytes say nothing
         pass
-    return reason, field, retry_after
+    return found
