@@ -274,7 +274,7 @@ class Session:
             Sizes above 0; see `size_values` of `wellspace.mesh`.
         points : (m, d) float
             Where they are. Default: at the vertices of the session's mesh, one for each, as an adaptive solver has
-            them.
+            them. Between points a size grows by `gradation`, so that it is larger there.
         unit : {"radius", "edge"}
             The measure of the values: bounds on circumradii, or lengths of edges.
         mesh_revision : int
