@@ -18,6 +18,10 @@
 #include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
+#include "client/client.h"
+#include "client/error_details.h"
+#include "client/mesh_sink.h"
+#include "client/point_source.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "tests/server/daemon.h"
@@ -161,6 +165,63 @@ TEST_F(ReplicasTest, ASessionIsFoundWhereItIs) {
   calls.Delete(other);
   CallsOf(*first).Get(other, &status);
   EXPECT_EQ(DetailsOf(status).reason, "SESSION_NOT_FOUND");
+}
+
+// A client of the library that was connected to one server goes through the life of a session of another one, which
+// dies in the middle of it.
+TEST_F(ReplicasTest, AClientGoesWhereTheSessionIs) {
+  const auto first = Start("first");
+  auto second = Start("second");
+  client::Client client = first->Client();
+  client::SessionOptions options;
+  options.parameters.dimension = 2;
+  const std::string name = second->Client().CreateSession(options)->name;
+  const std::vector<double> points = UniformPoints(300, 2, 1);
+  client::SpanSource source(2, points);
+  const absl::StatusOr<client::Uploaded> uploaded = client.UploadPoints(name, source);
+  ASSERT_TRUE(uploaded.ok()) << uploaded.status();
+  EXPECT_EQ(uploaded->committed_points, 300u);
+  const auto refine = [&] {
+    const absl::StatusOr<client::Operation> started = client.StartRefinement(name);
+    ASSERT_TRUE(started.ok()) << started.status();
+    const absl::StatusOr<client::Operation> ended = client.WatchOperation(started->name);
+    ASSERT_TRUE(ended.ok()) << ended.status();
+    EXPECT_EQ(ended->state, client::OperationState::kSucceeded);
+  };
+  refine();
+  const auto download = [&] {
+    client::MeshCollector mesh;
+    const absl::Status status = client.DownloadMesh(name, mesh);
+    EXPECT_TRUE(status.ok()) << status;
+    return std::move(mesh.mesh());
+  };
+  const client::Mesh before = download();
+  EXPECT_GE(before.points.size(), points.size());
+  EXPECT_EQ(second->Client().GetSession(name)->name, name) << "it is still there";
+  second->process().Signal(SIGKILL);
+  second->process().Wait();
+  // The lease has to run out first; a client is patient for that long.
+  const absl::StatusOr<client::Session> taken = client.GetSession(name);
+  ASSERT_TRUE(taken.ok()) << taken.status();
+  EXPECT_EQ(taken->committed_points, 300u);
+  EXPECT_EQ(first->Client().GetSession(name)->name, name) << "the first has it now";
+  const client::Mesh after = download();
+  EXPECT_EQ(after.points, before.points);
+  EXPECT_EQ(after.simplices, before.simplices);
+  const absl::StatusOr<client::AddedVertices> added = client.AddVertices(name, std::vector<double>{0.501, 0.499});
+  ASSERT_TRUE(added.ok()) << added.status();
+  refine();
+  EXPECT_GT(download().points.size(), before.points.size());
+  // Where following is off, the address is the caller's.
+  const auto again = Start("second");
+  client::ConnectOptions stay;
+  stay.follow = false;
+  client::CallOptions call;
+  call.timeout = absl::Seconds(2);
+  const absl::Status elsewhere = again->Client(stay).GetSession(name, call).status();
+  EXPECT_EQ(client::OwnerAddressOf(elsewhere), first->address()) << elsewhere;
+  EXPECT_EQ(again->Client().DeleteSession(name), absl::OkStatus());
+  EXPECT_TRUE(absl::IsNotFound(client.GetSession(name).status()));
 }
 
 TEST_F(ReplicasTest, WhoIsKilledIsTakenOver) {
