@@ -106,7 +106,7 @@ class ReplicasTest : public ::testing::Test {
     return name;
   }
   // That every kind of call works on a session that was made by another server, whose mesh was `mesh`.
-  static void UseSession(Daemon& daemon, const std::string& name, const std::string& mesh) {
+  static void UseSession(Daemon& daemon, const std::string& name, const std::string& mesh, int operations = 1) {
     SessionCalls calls = CallsOf(daemon);
     EXPECT_EQ(calls.MeshBytes(name), mesh);
     EXPECT_THAT(calls.List({}).sessions(), SizeIs(1));
@@ -117,7 +117,7 @@ class ReplicasTest : public ::testing::Test {
                       return request;
                     }())
                     .operations(),
-                SizeIs(1));
+                SizeIs(operations));
     grpc::ClientContext context;
     v1::AddVerticesRequest add;
     add.set_name(name);
@@ -293,6 +293,36 @@ TEST_F(ReplicasTest, WhoStoodStillChangesNothing) {
   UseSession(*second, name, mesh);
   const auto again = Start("first");
   EXPECT_EQ(CallsOf(*again).List({}).sessions_size(), 0);
+}
+
+// A server with a folder of its own becomes one of several, and alone again.
+TEST_F(ReplicasTest, RecordsMoveToAndFro) {
+  const auto move = [&](const std::vector<std::string>& arguments) {
+    Subprocess process("wellspaced", arguments, ErrorPath("move"));
+    EXPECT_EQ(process.Wait(), 0) << TextOfFile(ErrorPath("move"));
+  };
+  const std::vector<std::string> alone = {"--data", folder_.path()};
+  std::string name;
+  std::string mesh;
+  {
+    Daemon own(alone, ErrorPath("own"));
+    name = MakeSession(own);
+    mesh = CallsOf(own).MeshBytes(name);
+    own.Stop();
+  }
+  EXPECT_EQ(Subprocess("wellspaced", {"move-data", folder_.path()}, ErrorPath("wrong")).Wait(), 2);
+  EXPECT_THAT(TextOfFile(ErrorPath("wrong")), HasSubstr("wants --store"));
+  move({"--store", store_, "move-data", folder_.path()});
+  {
+    const auto first = Start("first");
+    EXPECT_EQ(CallsOf(*first).MeshBytes(name), mesh);
+    EXPECT_EQ(CallsOf(*first).Refine(name).state(), v1::Operation::STATE_SUCCEEDED);
+    mesh = CallsOf(*first).MeshBytes(name);
+    first->Stop();
+  }
+  move({"move-data", "--back", "--store", store_, folder_.path()});
+  Daemon own(alone, ErrorPath("own"));
+  UseSession(own, name, mesh, /*operations=*/2);
 }
 
 TEST_F(ReplicasTest, TwoOfOneNameDoNotServeAtOnce) {
