@@ -4,7 +4,9 @@
 // makes a line for --token-file;
 //     wellspaced check-data DIR
 //     wellspaced back-up DIR TO
-// check and copy the folder of a server, also while it serves.
+// check and copy the folder of a server, also while it serves;
+//     wellspaced --store postgresql://… move-data [--back] DIR
+// moves its records into a database that several servers share, or back.
 //     wellspaced --check-config
 // prints the options in force, and where they come from, and does not serve.
 //
@@ -42,6 +44,7 @@
 #include "server/store/back_up.h"
 #include "server/store/check_data.h"
 #include "server/store/durable_log.h"
+#include "server/store/move_data.h"
 #include "server/store/postgres_options.h"
 #include "server/store/shared_log.h"
 
@@ -69,6 +72,8 @@ struct Flags {
   std::string checked_folder;   // checks it and does not serve
   std::string copied_folder;    // copies it to the next and does not serve
   std::string copy;
+  std::string moved_folder;  // moves its records to the store, or back, and does not serve
+  bool moves_back = false;
 };
 
 void DeclareSecurity(CLI::App& app, SecurityOptions& security) {
@@ -155,6 +160,13 @@ void Declare(CLI::App& app, Flags& flags) {
   back_up.add_option("to", flags.copy, "New or empty folder, with which a server can be started")
       ->type_name("DIR")
       ->required();
+  CLI::App& move = *app.add_subcommand(
+      "move-data", "Move the records of a folder of --data into the database of --store, or back; no server may run");
+  move.fallthrough();
+  move.add_option("folder", flags.moved_folder, "The folder, whose points and meshes stay where they are")
+      ->type_name("DIR")
+      ->required();
+  move.add_flag("--back", flags.moves_back, "Move them from the database of --store into one in the folder");
 }
 
 // Whether sessions are shared with other servers.
@@ -237,8 +249,31 @@ int Report(const std::string& folder, const absl::StatusOr<DataReport>& report) 
   return report->is_whole() ? exit : 1;
 }
 
+// Moves the records of a folder, and says where they are.
+int MoveData(const Flags& flags) {
+  const std::string& folder = flags.moved_folder;
+  if (flags.store.address.empty()) {
+    std::cerr << "wellspaced: move-data wants --store, too: the database to move to, or from with --back" << std::endl;
+    return kExitWrongOptions;
+  }
+  const absl::Status moved = flags.moves_back ? MoveToFolder(flags.store, folder) : MoveToPostgres(folder, flags.store);
+  const std::string shown = ShownPostgresAddress(flags.store.address).value_or("");
+  if (!moved.ok()) {
+    std::cerr << "wellspaced: " << folder << ", " << shown << ": " << moved.message() << std::endl;
+    return 1;
+  }
+  if (flags.moves_back) {
+    return Report(folder, CheckData(folder));
+  }
+  std::cout << folder << ": moved; its records are in " << shown << "\n";
+  return ExitOfPrinted("the report");
+}
+
 // Whether what belongs to --store is there, too.
 absl::Status CheckStore(const Flags& flags) {
+  if (!flags.moved_folder.empty()) {
+    return absl::OkStatus();
+  }
   return IsShared(flags) && flags.data.empty()
              ? absl::InvalidArgumentError(
                    "--store wants --data, too: the folder of points and meshes, which all servers of the store share")
@@ -360,6 +395,9 @@ std::optional<int> RunCommand(const Flags& flags) {
   }
   if (!flags.copied_folder.empty()) {
     return Report(flags.copy, BackUp(flags.copied_folder, flags.copy));
+  }
+  if (!flags.moved_folder.empty()) {
+    return MoveData(flags);
   }
   return std::nullopt;
 }

@@ -4,6 +4,7 @@
 //   back-up.lock      held by a back-up
 //   sessions.db       and -wal, -shm beside it: the database (SessionTables)
 //   sessions.db-mark  how much of -wal has to be there (LogMark)
+//   sessions.db.moved the database of before, since its records were moved to one elsewhere (MoveToPostgres)
 //   ballast           room that is kept for deletions (Ballast)
 //   store             in the place of all these, where the records are in a database elsewhere: which one (Pairing)
 //   files/            points and meshes of sessions
@@ -94,6 +95,13 @@ class DataFolder {
   //
   // Errors:     FAILED_PRECONDITION, with that database.
   static absl::Status CheckNotPaired(const DataPaths& paths, FileSystem& files);
+
+  // For a process that has opened the folder for itself: which database elsewhere it belongs to, none: its own; and the
+  // change of that, at once, for moves.
+  //
+  // Errors:     those of a FileSystem.
+  absl::StatusOr<Pairing> PairedWith() const;
+  absl::Status SetPairing(const Pairing& with);
 
   // Looks for the database, and makes an empty one in a new folder. True where it may have no tables: it is new, or the
   // server that made it ended before it had made them.

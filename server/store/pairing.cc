@@ -91,6 +91,16 @@ absl::Status DataFolder::Pair(const Pairing& with) {
   return WritePairing(paths_, files_, with);
 }
 
+absl::StatusOr<Pairing> DataFolder::PairedWith() const { return ReadPairing(paths_, files_); }
+
+absl::Status DataFolder::SetPairing(const Pairing& with) {
+  if (!with.id.empty()) {
+    return WritePairing(paths_, files_, with);
+  }
+  WELLSPACE_RETURN_IF_ERROR(files_.Remove(paths_.pairing()));
+  return files_.SynchronizeFolder(paths_.root);
+}
+
 absl::Status DataFolder::CheckNotPaired(const DataPaths& paths, FileSystem& files) {
   WELLSPACE_ASSIGN_OR_RETURN(const Pairing paired, ReadPairing(paths, files));
   return paired.id.empty() ? absl::OkStatus()

@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include "core/base/status_macros.h"
+#include "server/store/postgres_rows.h"
 #include "server/store/postgres_schema.h"
 #include "server/store/record_keys.h"
 #include "server/store/record_rows.h"
@@ -17,56 +18,15 @@
 namespace wellspace::server {
 namespace {
 
+using sql::Blob;
+using sql::Parse;
+using sql::ParseAnswer;
+using sql::ParseSession;
+using sql::ParseStep;
+using sql::PostgresRows;
+
 // Of an owner that is no more, answers are kept for so long: longer than RequestIds does.
 constexpr absl::Duration kKeptAnswers = absl::Hours(1);
-
-pqxx::binarystring Blob(std::string_view bytes) { return {bytes.data(), bytes.size()}; }
-
-int64_t Checksum(const std::string& key, std::string_view record) {
-  return static_cast<int64_t>(ChecksumOf(key, record));
-}
-
-// The key of the record of a session, the same for every owner.
-std::string KeyOf(std::string_view session) { return KeyOfSession(session, /*epoch=*/0); }
-
-absl::Status Damaged(const std::string& what) {
-  return MakeError(v1::ERROR_REASON_FILE_DAMAGED, absl::StrCat("the database: ", what, " is damaged"));
-}
-
-// The record in these fields of a row; `what` says which it is.
-template <typename Record>
-absl::StatusOr<Record> Parse(const std::string& key, const pqxx::row& row, int record, const std::string& what) {
-  Record parsed;
-  const pqxx::binarystring bytes(row[record]);
-  if (!ParseRecord(key, {bytes.get(), bytes.size()}, row[record + 1].as<int64_t>(), parsed)) {
-    return Damaged(what);
-  }
-  return parsed;
-}
-
-absl::StatusOr<store::v1::StepRecord> ParseStep(const pqxx::row& row) {
-  const auto session = row[0].as<int64_t>();
-  const auto number = row[1].as<int64_t>();
-  return Parse<store::v1::StepRecord>(KeyOfStep(session, number, row[2].as<int64_t>()), row, 3,
-                                      absl::StrCat("step ", number, " of session ", session));
-}
-
-// A row of id, name, epoch, state and crc32c.
-absl::StatusOr<StoredSession> ParseSession(const pqxx::row& row) {
-  const auto name = row[1].as<std::string>();
-  StoredSession session{.epoch = row[2].as<uint64_t>(), .state = {}, .steps = {}, .operations = {}};
-  WELLSPACE_ASSIGN_OR_RETURN(
-      session.state,
-      Parse<store::v1::SessionRecord>(KeyOf(name), row, 3, absl::StrCat("the record of session '", name, "'")));
-  return session;
-}
-
-absl::StatusOr<store::v1::AnswerRecord> ParseAnswer(const pqxx::row& row) {
-  const pqxx::binarystring tenant(row[0]);
-  const pqxx::binarystring request(row[1]);
-  return Parse<store::v1::AnswerRecord>(KeyOfAnswer(tenant.str(), request.str()), row, 2,
-                                        absl::StrCat("the answer to request '", request.str(), "'"));
-}
 
 // Steps, but those of features, and operations of these sessions, whose rows are `ids`. `where` says which rows.
 absl::Status LoadSteps(pqxx::dbtransaction& transaction, const std::string& where, std::span<StoredSession> sessions,
@@ -149,74 +109,6 @@ absl::Status Pair(PostgresLink& link, const std::string& shown, DataFolder& fold
     return absl::OkStatus();
   });
 }
-
-class PostgresRows final : public RecordRows {
- public:
-  PostgresRows(pqxx::dbtransaction& transaction, int64_t owner) : transaction_(transaction), owner_(owner) {}
-
-  absl::StatusOr<Row> FindSession(const std::string& session) override {
-    const pqxx::result found = transaction_.exec_prepared(sql::kFindSession, session);
-    Row row;
-    if (!found.empty()) {
-      row = {.id = found[0][0].as<int64_t>(), .own_epoch = found[0][1].as<int64_t>()};
-      row.epoch = row.own_epoch;
-    }
-    return row;
-  }
-
-  absl::StatusOr<int64_t> InsertSession(const std::string& session, int64_t epoch, const std::string& record) override {
-    return transaction_
-        .exec_prepared1(sql::kInsertSession, session, owner_, epoch, Blob(record), Checksum(KeyOf(session), record))[0]
-        .as<int64_t>();
-  }
-
-  absl::Status UpdateSession(const std::string& session, const Row& row, const std::string& record) override {
-    return Run(sql::kUpdateSession, *row.id, Blob(record), Checksum(KeyOf(session), record));
-  }
-
-  absl::Status DeleteSession(int64_t id) override { return Run(sql::kDeleteSession, id); }
-
-  absl::StatusOr<int64_t> NextStep(int64_t session) override {
-    return transaction_.exec_prepared1(sql::kNextStep, session)[0].as<int64_t>();
-  }
-
-  absl::Status InsertStep(int64_t session, int64_t number, int64_t kind, const std::string& record) override {
-    return Run(sql::kInsertStep, session, number, kind, Blob(record),
-               Checksum(KeyOfStep(session, number, kind), record));
-  }
-
-  absl::Status PutOperation(int64_t session, int64_t number, const std::string& record) override {
-    return Run(sql::kPutOperation, session, number, Blob(record), Checksum(KeyOfOperation(session, number), record));
-  }
-
-  absl::Status DropOperation(int64_t session, int64_t number) override {
-    return Run(sql::kDropOperation, session, number);
-  }
-
-  absl::Status InsertSizes(int64_t session, int64_t number, int64_t part, const std::string& record) override {
-    return Run(sql::kInsertSizes, session, number, part, Blob(record),
-               Checksum(KeyOfSizes(session, number, part), record));
-  }
-
-  absl::Status DropSizes(int64_t session, int64_t number) override { return Run(sql::kDropSizes, session, number); }
-
-  absl::StatusOr<bool> InsertAnswer(const store::v1::AnswerRecord& answer, const std::string& record) override {
-    const pqxx::result inserted = transaction_.exec_prepared(
-        sql::kInsertAnswer, Blob(answer.tenant()), Blob(answer.request_id()), Blob(record), answer.time_ns(),
-        Checksum(KeyOfAnswer(answer.tenant(), answer.request_id()), record));
-    return inserted.affected_rows() > 0;
-  }
-
- private:
-  template <typename... Values>
-  absl::Status Run(const char* statement, const Values&... values) {
-    transaction_.exec_prepared0(statement, values...);
-    return absl::OkStatus();
-  }
-
-  pqxx::dbtransaction& transaction_;
-  const int64_t owner_;
-};
 
 }  // namespace
 

@@ -16,7 +16,7 @@ constexpr char kLockSchema[] = "SELECT pg_advisory_xact_lock(5995635)";
 // Each makes version n + kFirstVersion of the version before. A released step is never changed: there are databases
 // that it has made. Versions are those of SQLite's tables, so that one number says which records there are.
 constexpr int kFirstVersion = 3;
-constexpr std::array kMigrations = {
+constexpr std::array kPostgresMigrations = {
     "CREATE SCHEMA IF NOT EXISTS wellspace;"
     // folder: that of the files that the records name, where it was first named; null: none was yet.
     "CREATE TABLE wellspace.store(version integer NOT NULL, id text NOT NULL, folder text);"
@@ -43,7 +43,7 @@ constexpr std::array kMigrations = {
     "CREATE TABLE wellspace.answers(tenant bytea NOT NULL, request_id bytea NOT NULL, record bytea NOT NULL,"
     "                               time bigint NOT NULL, crc32c bigint NOT NULL, PRIMARY KEY(tenant, request_id));",
 };
-constexpr int kVersion = kFirstVersion + static_cast<int>(kMigrations.size()) - 1;
+constexpr int kVersion = kFirstVersion + static_cast<int>(kPostgresMigrations.size()) - 1;
 
 absl::Status Migrate(pqxx::dbtransaction& transaction) {
   transaction.exec(kLockSchema);
@@ -56,7 +56,7 @@ absl::Status Migrate(pqxx::dbtransaction& transaction) {
                      "; start the newer wellspaced, or restore a back-up that was made before it"));
   }
   for (int from = version; from < kVersion; ++from) {
-    transaction.exec(kMigrations[from + 1 - kFirstVersion]);
+    transaction.exec(kPostgresMigrations[from + 1 - kFirstVersion]);
   }
   if (version < kVersion) {
     transaction.exec(absl::StrCat("UPDATE wellspace.store SET version = ", kVersion));

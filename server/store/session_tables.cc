@@ -256,6 +256,16 @@ absl::Status SessionTables::Transact(Survives survives, const std::function<absl
   return applied;
 }
 
+absl::Status SessionTables::Fill(uint64_t epoch, const std::function<absl::Status(RecordRows& rows)>& fill) {
+  const std::lock_guard lock(mutex_);
+  Rows rows(*this);
+  return Transact(Survives::kPowerLoss, [&]() -> absl::Status {
+    const auto last = static_cast<int64_t>(epoch);
+    WELLSPACE_RETURN_IF_ERROR(WriteEpochs({.last = last, .everything = last}));
+    return fill(rows);
+  });
+}
+
 absl::StatusOr<uint64_t> SessionTables::NextEpoch() {
   const std::lock_guard lock(mutex_);
   WELLSPACE_ASSIGN_OR_RETURN(const Epochs epochs, ReadEpochs());

@@ -20,6 +20,8 @@
 
 namespace wellspace::server {
 
+class RecordRows;
+
 struct SessionTablesOptions {
   const char* vfs = nullptr;    // of SQLite; null: that of the machine
   bool is_exclusive = false;    // no other process may look at it meanwhile; needs no shared memory
@@ -92,6 +94,16 @@ class SessionTables {
   // The faults of the file itself, by PRAGMA integrity_check; none: it is whole.
   absl::StatusOr<std::vector<std::string>> CheckFile();
 
+  // Puts all rows into those of another database, whose sessions are at `epoch` there.
+  //
+  // Errors:     those of `rows`.
+  absl::Status CopyRows(int64_t epoch, RecordRows& rows);
+  // Has `fill` put rows into tables that have none, in one transaction. `epoch` is the last that an owner of them has
+  // got.
+  //
+  // Errors:     those of Apply, and of `fill`.
+  absl::Status Fill(uint64_t epoch, const std::function<absl::Status(RecordRows& rows)>& fill);
+
   // Copies all to the new file `path`, as it is at one moment.
   //
   // Errors:     DISK_FULL and STORE_FAILED are about the copy.
@@ -130,6 +142,7 @@ class SessionTables {
   // Calls `take` with each row of `statement`. A fault that it returns is an error, or goes into `problems`.
   absl::Status ForEach(SqliteStatement& statement, std::vector<std::string>* problems,
                        const std::function<std::string(const SqliteStatement& row)>& take);
+  absl::Status CopyRowsLocked(int64_t epoch, RecordRows& rows);
   // Of all sessions, or of the one that there is.
   absl::Status LoadSteps(std::span<StoredSession> sessions, std::span<const int64_t> ids, bool is_of_one,
                          std::vector<std::string>* problems);

@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
+#include "server/store/record_rows.h"
 #include "server/store/session_statements.h"
 #include "server/store/session_tables.h"
 #include "server/wire/errors.h"
@@ -77,6 +78,74 @@ absl::StatusOr<StoredSessions> SessionTables::Load(std::vector<std::string>* pro
   WELLSPACE_RETURN_IF_ERROR(loaded);
   std::ranges::stable_sort(stored.sessions, {}, [](const StoredSession& s) { return s.state.create_time_ns(); });
   return stored;
+}
+
+absl::Status SessionTables::CopyRows(int64_t epoch, RecordRows& rows) {
+  const std::lock_guard lock(mutex_);
+  WELLSPACE_RETURN_IF_ERROR(database_->Execute("BEGIN"));
+  const absl::Status copied = CopyRowsLocked(epoch, rows);
+  WELLSPACE_RETURN_IF_ERROR(database_->Execute("COMMIT"));
+  return copied;
+}
+
+absl::Status SessionTables::CopyRowsLocked(int64_t epoch, RecordRows& rows) {
+  std::unordered_map<int64_t, int64_t> ids;  // of the rows there, by those here
+  absl::Status status;                       // of `rows`
+  // Calls `take` with each row of a table, once the record in it is found whole.
+  const auto copy = [&]<typename Record>(std::string_view query, int record_column, const auto& key_of,
+                                         const auto& take, Record record) -> absl::Status {
+    WELLSPACE_ASSIGN_OR_RETURN(SqliteStatement table, database_->Prepare(query));
+    WELLSPACE_RETURN_IF_ERROR(ForEach(table, nullptr, [&](const SqliteStatement& row) -> std::string {
+      const std::string key = key_of(row);
+      const std::string_view bytes = row.Bytes(record_column);
+      if (!ParseRecord(key, bytes, row.Number(record_column + 1), record)) {
+        return absl::StrCat("the record of ", key, " is damaged");
+      }
+      status = status.ok() ? take(row, std::string(bytes)) : status;
+      return "";
+    }));
+    return status;
+  };
+  const auto id_of = [&](const SqliteStatement& row) { return ids[row.Number(0)]; };
+  WELLSPACE_RETURN_IF_ERROR(copy(
+      "SELECT id, name, epoch, state, crc32c FROM sessions ORDER BY id", 3,
+      [](const SqliteStatement& row) { return KeyOfSession(row.Bytes(1), row.Number(2)); },
+      [&](const SqliteStatement& row, const std::string& record) -> absl::Status {
+        const absl::StatusOr<int64_t> id = rows.InsertSession(std::string(row.Bytes(1)), epoch, record);
+        ids[row.Number(0)] = id.ok() ? *id : 0;
+        return id.status();
+      },
+      store::v1::SessionRecord()));
+  WELLSPACE_RETURN_IF_ERROR(copy(
+      "SELECT session, number, kind, record, crc32c FROM steps ORDER BY session, number", 3,
+      [](const SqliteStatement& row) { return KeyOfStep(row.Number(0), row.Number(1), row.Number(2)); },
+      [&](const SqliteStatement& row, const std::string& record) {
+        return rows.InsertStep(id_of(row), row.Number(1), row.Number(2), record);
+      },
+      store::v1::StepRecord()));
+  WELLSPACE_RETURN_IF_ERROR(copy(
+      "SELECT session, number, record, crc32c FROM operations ORDER BY session, number", 2,
+      [](const SqliteStatement& row) { return KeyOfOperation(row.Number(0), row.Number(1)); },
+      [&](const SqliteStatement& row, const std::string& record) {
+        return rows.PutOperation(id_of(row), row.Number(1), record);
+      },
+      store::v1::OperationRecord()));
+  WELLSPACE_RETURN_IF_ERROR(copy(
+      "SELECT session, number, part, record, crc32c FROM sizes ORDER BY session, number, part", 3,
+      [](const SqliteStatement& row) { return KeyOfSizes(row.Number(0), row.Number(1), row.Number(2)); },
+      [&](const SqliteStatement& row, const std::string& record) {
+        return rows.InsertSizes(id_of(row), row.Number(1), row.Number(2), record);
+      },
+      store::v1::SizesRecord()));
+  return copy(
+      "SELECT tenant, request_id, record, crc32c FROM answers", 2,
+      [](const SqliteStatement& row) { return KeyOfAnswer(row.Bytes(0), row.Bytes(1)); },
+      [&](const SqliteStatement& /*row*/, const std::string& record) -> absl::Status {
+        store::v1::AnswerRecord answer;
+        answer.ParseFromString(record);
+        return rows.InsertAnswer(answer, record).status();
+      },
+      store::v1::AnswerRecord());
 }
 
 absl::Status SessionTables::LoadSteps(std::span<StoredSession> sessions, std::span<const int64_t> ids, bool is_of_one,

@@ -18,6 +18,10 @@
 #include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
+#include "client/client.h"
+#include "client/error_details.h"
+#include "client/mesh_sink.h"
+#include "client/point_source.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "tests/server/daemon.h"
@@ -102,7 +106,7 @@ class ReplicasTest : public ::testing::Test {
     return name;
   }
   // That every kind of call works on a session that was made by another server, whose mesh was `mesh`.
-  static void UseSession(Daemon& daemon, const std::string& name, const std::string& mesh) {
+  static void UseSession(Daemon& daemon, const std::string& name, const std::string& mesh, int operations = 1) {
     SessionCalls calls = CallsOf(daemon);
     EXPECT_EQ(calls.MeshBytes(name), mesh);
     EXPECT_THAT(calls.List({}).sessions(), SizeIs(1));
@@ -113,7 +117,7 @@ class ReplicasTest : public ::testing::Test {
                       return request;
                     }())
                     .operations(),
-                SizeIs(1));
+                SizeIs(operations));
     grpc::ClientContext context;
     v1::AddVerticesRequest add;
     add.set_name(name);
@@ -161,6 +165,63 @@ TEST_F(ReplicasTest, ASessionIsFoundWhereItIs) {
   calls.Delete(other);
   CallsOf(*first).Get(other, &status);
   EXPECT_EQ(DetailsOf(status).reason, "SESSION_NOT_FOUND");
+}
+
+// A client of the library that was connected to one server goes through the life of a session of another one, which
+// dies in the middle of it.
+TEST_F(ReplicasTest, AClientGoesWhereTheSessionIs) {
+  const auto first = Start("first");
+  auto second = Start("second");
+  client::Client client = first->Client();
+  client::SessionOptions options;
+  options.parameters.dimension = 2;
+  const std::string name = second->Client().CreateSession(options)->name;
+  const std::vector<double> points = UniformPoints(300, 2, 1);
+  client::SpanSource source(2, points);
+  const absl::StatusOr<client::Uploaded> uploaded = client.UploadPoints(name, source);
+  ASSERT_TRUE(uploaded.ok()) << uploaded.status();
+  EXPECT_EQ(uploaded->committed_points, 300u);
+  const auto refine = [&] {
+    const absl::StatusOr<client::Operation> started = client.StartRefinement(name);
+    ASSERT_TRUE(started.ok()) << started.status();
+    const absl::StatusOr<client::Operation> ended = client.WatchOperation(started->name);
+    ASSERT_TRUE(ended.ok()) << ended.status();
+    EXPECT_EQ(ended->state, client::OperationState::kSucceeded);
+  };
+  refine();
+  const auto download = [&] {
+    client::MeshCollector mesh;
+    const absl::Status status = client.DownloadMesh(name, mesh);
+    EXPECT_TRUE(status.ok()) << status;
+    return std::move(mesh.mesh());
+  };
+  const client::Mesh before = download();
+  EXPECT_GE(before.points.size(), points.size());
+  EXPECT_EQ(second->Client().GetSession(name)->name, name) << "it is still there";
+  second->process().Signal(SIGKILL);
+  second->process().Wait();
+  // The lease has to run out first; a client is patient for that long.
+  const absl::StatusOr<client::Session> taken = client.GetSession(name);
+  ASSERT_TRUE(taken.ok()) << taken.status();
+  EXPECT_EQ(taken->committed_points, 300u);
+  EXPECT_EQ(first->Client().GetSession(name)->name, name) << "the first has it now";
+  const client::Mesh after = download();
+  EXPECT_EQ(after.points, before.points);
+  EXPECT_EQ(after.simplices, before.simplices);
+  const absl::StatusOr<client::AddedVertices> added = client.AddVertices(name, std::vector<double>{0.501, 0.499});
+  ASSERT_TRUE(added.ok()) << added.status();
+  refine();
+  EXPECT_GT(download().points.size(), before.points.size());
+  // Where following is off, the address is the caller's.
+  const auto again = Start("second");
+  client::ConnectOptions stay;
+  stay.follow = false;
+  client::CallOptions call;
+  call.timeout = absl::Seconds(2);
+  const absl::Status elsewhere = again->Client(stay).GetSession(name, call).status();
+  EXPECT_EQ(client::OwnerAddressOf(elsewhere), first->address()) << elsewhere;
+  EXPECT_EQ(again->Client().DeleteSession(name), absl::OkStatus());
+  EXPECT_TRUE(absl::IsNotFound(client.GetSession(name).status()));
 }
 
 TEST_F(ReplicasTest, WhoIsKilledIsTakenOver) {
@@ -232,6 +293,36 @@ TEST_F(ReplicasTest, WhoStoodStillChangesNothing) {
   UseSession(*second, name, mesh);
   const auto again = Start("first");
   EXPECT_EQ(CallsOf(*again).List({}).sessions_size(), 0);
+}
+
+// A server with a folder of its own becomes one of several, and alone again.
+TEST_F(ReplicasTest, RecordsMoveToAndFro) {
+  const auto move = [&](const std::vector<std::string>& arguments) {
+    Subprocess process("wellspaced", arguments, ErrorPath("move"));
+    EXPECT_EQ(process.Wait(), 0) << TextOfFile(ErrorPath("move"));
+  };
+  const std::vector<std::string> alone = {"--data", folder_.path()};
+  std::string name;
+  std::string mesh;
+  {
+    Daemon own(alone, ErrorPath("own"));
+    name = MakeSession(own);
+    mesh = CallsOf(own).MeshBytes(name);
+    own.Stop();
+  }
+  EXPECT_EQ(Subprocess("wellspaced", {"move-data", folder_.path()}, ErrorPath("wrong")).Wait(), 2);
+  EXPECT_THAT(TextOfFile(ErrorPath("wrong")), HasSubstr("wants --store"));
+  move({"--store", store_, "move-data", folder_.path()});
+  {
+    const auto first = Start("first");
+    EXPECT_EQ(CallsOf(*first).MeshBytes(name), mesh);
+    EXPECT_EQ(CallsOf(*first).Refine(name).state(), v1::Operation::STATE_SUCCEEDED);
+    mesh = CallsOf(*first).MeshBytes(name);
+    first->Stop();
+  }
+  move({"move-data", "--back", "--store", store_, folder_.path()});
+  Daemon own(alone, ErrorPath("own"));
+  UseSession(own, name, mesh, /*operations=*/2);
 }
 
 TEST_F(ReplicasTest, TwoOfOneNameDoNotServeAtOnce) {
