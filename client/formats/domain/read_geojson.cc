@@ -277,7 +277,7 @@ bool GeoJsonReader::StartObjectIn(Level& parent) {
   Role role = Role::kGeometry;
   switch (parent.kind) {
     case Level::kProperties:
-      return Property(nullptr, "an object") && Skip();
+      return Property({.text = "an object"}) && Skip();
     case Level::kFeatures:
       role = Role::kFeature;
       break;
@@ -347,7 +347,7 @@ bool GeoJsonReader::start_array(size_t /*elements*/) {
   }
   Level& level = levels_.back();
   if (level.kind == Level::kProperties) {
-    return Property(nullptr, "an array") && Skip();
+    return Property({.text = "an array"}) && Skip();
   }
   return level.kind == Level::kObject ? StartArrayIn(level) : FailKind("an array");
 }
