@@ -10,6 +10,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/cli/face_rules.h"
+#include "client/cli/part_name_options.h"
 #include "client/cli/remote_command.h"
 #include "client/error_details.h"
 #include "client/files/domain_features.h"

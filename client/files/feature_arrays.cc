@@ -1,6 +1,8 @@
 #include "client/files/feature_arrays.h"
 
+#include <cstdint>
 #include <limits>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -61,6 +63,25 @@ void WriteText(const char* member, const char* text, NpzFile& file) {
   file.WriteTexts(member, texts);
 }
 
+void WriteNames(const char* member, const char* numbers_member, const std::map<int32_t, std::string>& names,
+                NpzFile& file) {
+  std::vector<int32_t> numbers;
+  std::vector<std::string> texts;
+  for (const auto& [number, name] : names) {
+    numbers.push_back(number);
+    texts.push_back(name);
+  }
+  if (!numbers.empty()) {
+    file.WriteTexts(member, texts);
+    file.WriteArray(numbers_member, std::span<const int32_t>(numbers));
+  }
+}
+
+void WriteNames(const PartNames& names, NpzFile& file) {
+  WriteNames("marker_names.npy", "named_markers.npy", names.markers, file);
+  WriteNames("region_names.npy", "named_regions.npy", names.regions, file);
+}
+
 void WriteSeeds(const std::vector<FaceSeed>& seeds, NpzFile& file) {
   std::vector<double> holes;
   std::vector<double> points;
@@ -106,26 +127,19 @@ absl::Status WriteFeatureArrays(const std::string& path, const formats::PointClo
   WriteIfAny("is_open.npy", features.is_open, *file);
   WriteIfAny("groups.npy", features.groups, *file);
   WriteText("faces.npy", NameOf(features.faces), *file);
+  WriteNames(features.names, *file);
   WriteSeeds(features.seeds, *file);
   return file->Commit();
 }
 
 absl::Status WriteFeatureArrays(const std::string& path, const formats::PointCloud& points,
-                                const SurfaceFeatures& features, const std::map<int32_t, std::string>& names,
-                                std::stop_token stop) {
+                                const SurfaceFeatures& features, std::stop_token stop) {
   WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<NpzFile> file, NpzFile::Create(path, std::move(stop)));
   WriteRows("points.npy", points.points, points.dimension, *file);
   WriteRows("triangles.npy", features.corners, 3, *file);
   WriteIfAny("markers.npy", features.markers, *file);
   WriteText("solids.npy", NameOf(features.solids), *file);
-  std::vector<int32_t> markers;
-  std::vector<std::string> texts;
-  for (const auto& [marker, name] : names) {
-    markers.push_back(marker);
-    texts.push_back(name);
-  }
-  file->WriteTexts("names.npy", texts);
-  file->WriteArray("name_markers.npy", std::span<const int32_t>(markers));
+  WriteNames(features.names, *file);
   const double weld[] = {features.weld.value_or(0)};
   file->WriteArray("weld.npy", std::span<const double>(weld));
   WriteSeeds(features.seeds, *file);

@@ -9,7 +9,7 @@
 namespace wellspace::core {
 namespace {
 
-absl::Status CheckTable(const std::map<int32_t, std::string>& table, const char* field) {
+absl::Status CheckTable(const std::map<int32_t, std::string>& table, const std::string& field) {
   if (table.size() > kMostPartNames) {
     return absl::InvalidArgumentError(
         absl::StrCat(field, ": there are ", table.size(), " names; at most ", kMostPartNames, " are allowed"));

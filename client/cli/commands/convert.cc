@@ -14,6 +14,7 @@
 #include "client/cli/interrupt.h"
 #include "client/cli/mesh_paths.h"
 #include "client/cli/meshing_options.h"
+#include "client/cli/part_name_options.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/remote_command.h"
 #include "client/files/feature_arrays.h"
@@ -104,17 +105,18 @@ absl::Status ConvertCommand::ConvertSurface() {
     return absl::InvalidArgumentError("--columns and --skip-invalid are for points, and IN is a surface");
   }
   WELLSPACE_ASSIGN_OR_RETURN(formats::Surface surface, formats::ReadSurface(input, cloud_options.format));
-  const client::SurfaceFeatures features = client::FeaturesOf(surface, {}, surface.notes);
-  const CloudReport report = {.notes = surface.notes};
-  PrintNotes(report, format, /*quiet=*/false);
+  client::SurfaceFeatures features = client::FeaturesOf(surface, {}, surface.notes);
   std::map<int32_t, std::string> names;
   for (const formats::Surface::Part& part : surface.parts) {
     names.emplace(part.marker, part.name);
   }
+  AddPartNames(names, features.names.markers);
+  const CloudReport report = {.notes = surface.notes};
+  PrintNotes(report, format, /*quiet=*/false);
   formats::PointCloud points;
   points.dimension = 3;
   points.points = std::move(surface.points);
-  WELLSPACE_RETURN_IF_ERROR(client::WriteFeatureArrays(output.path, points, features, names, /*stop=*/{}));
+  WELLSPACE_RETURN_IF_ERROR(client::WriteFeatureArrays(output.path, points, features, /*stop=*/{}));
   Report({{"kind", "surface"}, {"dimension", 3}, {"points", points.size()}, {"triangles", features.corners.size() / 3}},
          report, {});
   return absl::OkStatus();

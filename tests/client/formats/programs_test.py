@@ -85,23 +85,26 @@ class Programs(unittest.TestCase):
                 self.assertEqual((int(figures[1]), int(figures[2])), (len(points), len(cells)))
                 self.assertAlmostEqual(float(figures[3]), volume, places=12)
 
-    def test_vtk_reads_our_vtu_vtkhdf_and_vtk(self):
+    def read_by_vtk(self, dimension, format):
+        """What VTK reads of mesh.FORMAT, and its area or volume."""
         import vtk
         readers = {"vtu": vtk.vtkXMLUnstructuredGridReader, "vtkhdf": vtk.vtkHDFReader,
                    "vtk": vtk.vtkUnstructuredGridReader}
-        for dimension, format in itertools.product((2, 3), readers):
+        reader = readers[format]()
+        reader.SetFileName(str(self.folder / f"mesh.{format}"))
+        sizes = vtk.vtkCellSizeFilter()
+        sizes.SetInputConnection(reader.GetOutputPort())
+        sizes.ComputeSumOn()
+        sizes.Update()
+        total = sizes.GetOutput().GetFieldData().GetArray("Area" if dimension == 2 else "Volume").GetValue(0)
+        return reader.GetOutput(), total
+
+    def test_vtk_reads_our_vtu_vtkhdf_and_vtk(self):
+        for dimension, format in itertools.product((2, 3), ("vtu", "vtkhdf", "vtk")):
             with self.subTest(dimension=dimension, format=format):
                 points, cells, volume = self.write(dimension, f"mesh.{format}", format)
-                reader = readers[format]()
-                reader.SetFileName(str(self.folder / f"mesh.{format}"))
-                sizes = vtk.vtkCellSizeFilter()
-                sizes.SetInputConnection(reader.GetOutputPort())
-                sizes.ComputeSumOn()
-                sizes.Update()
-                grid_of_vtk = reader.GetOutput()
-                self.assertEqual((grid_of_vtk.GetNumberOfPoints(), grid_of_vtk.GetNumberOfCells()),
-                                 (len(points), len(cells)))
-                total = sizes.GetOutput().GetFieldData().GetArray("Area" if dimension == 2 else "Volume").GetValue(0)
+                found, total = self.read_by_vtk(dimension, format)
+                self.assertEqual((found.GetNumberOfPoints(), found.GetNumberOfCells()), (len(points), len(cells)))
                 self.assertAlmostEqual(total, volume, places=12)
 
     def test_gmsh_measures_our_elements_of_second_order(self):
@@ -121,25 +124,16 @@ class Programs(unittest.TestCase):
     def test_vtk_reads_our_elements_of_second_order(self):
         """VTK maps places in a cell as its corners alone do: edges are straight, and nodes in VTK's order."""
         import vtk
-        readers = {"vtu": vtk.vtkXMLUnstructuredGridReader, "vtkhdf": vtk.vtkHDFReader,
-                   "vtk": vtk.vtkUnstructuredGridReader}
-        for dimension, format in itertools.product((2, 3), readers):
+        for dimension, format in itertools.product((2, 3), ("vtu", "vtkhdf", "vtk")):
             with self.subTest(dimension=dimension, format=format):
                 points, cells, volume = self.write(dimension, f"mesh.{format}", format, "--second-order")
-                reader = readers[format]()
-                reader.SetFileName(str(self.folder / f"mesh.{format}"))
-                sizes = vtk.vtkCellSizeFilter()
-                sizes.SetInputConnection(reader.GetOutputPort())
-                sizes.ComputeSumOn()
-                sizes.Update()
-                total = sizes.GetOutput().GetFieldData().GetArray("Area" if dimension == 2 else "Volume").GetValue(0)
+                found, total = self.read_by_vtk(dimension, format)
                 self.assertAlmostEqual(total, volume, places=12)
-                found = reader.GetOutput()
                 self.assertEqual(found.GetNumberOfCells(), len(cells))
+                kind = vtk.VTK_QUADRATIC_TRIANGLE if dimension == 2 else vtk.VTK_QUADRATIC_TETRA
                 for number, corners in enumerate(cells):
                     cell = found.GetCell(number)
-                    self.assertEqual(cell.GetCellType(), vtk.VTK_QUADRATIC_TRIANGLE if dimension == 2 else
-                                     vtk.VTK_QUADRATIC_TETRA)
+                    self.assertEqual(cell.GetCellType(), kind)
                     for local in ((0.1, 0.2, 0.3), (0.7, 0.05, 0.15)):
                         local = numpy.array(local[:dimension])
                         place, weights = [0.0] * 3, [0.0] * cell.GetNumberOfPoints()

@@ -77,11 +77,25 @@ class ReadTest(Case):
         np.testing.assert_array_equal(cloud.points, POINTS)
         np.testing.assert_array_equal(cloud.attributes["heat"], [1, 2, 3])
 
+    def test_names_of_parts(self):
+        np.savez(self.folder / "lake.npz", points=[[0.0, 0], [1, 0], [0, 1]], segments=[[0, 1], [1, 2], [2, 0]],
+                 markers=[5, 5, 6], faces=["holes"], holes=np.empty((0, 2)), seeds=[[0.2, 0.2, 7, np.inf]],
+                 polygons=np.empty((0, 4)), marker_names=["inlet", "wall"], named_markers=[5, 6],
+                 region_names=["water"], named_regions=[7])
+        domain = wellspace.read(self.folder / "lake.npz")
+        self.assertEqual(domain.arguments["marker_names"], {5: "inlet", 6: "wall"})
+        mesh = wellspace.mesh(domain.points, **domain.arguments)
+        self.assertEqual((mesh.facet_names, mesh.region_names), ({5: "inlet", 6: "wall"}, {7: "water"}))
+
     def test_surfaces(self):
         path = self.write("part.stl", STL)
         surface = wellspace.read(path)
         self.assertIsInstance(surface, SurfaceFile)
         self.assertEqual((len(surface.triangles), surface.names), (1, {1: "cap"}))
+        self.assertEqual(surface.arguments["marker_names"], {1: "cap"})
+        default = wellspace.read(self.write("other.stl", STL.replace("solid cap", "solid marker_7")))
+        self.assertEqual(default.names, {1: "marker_7"})
+        self.assertNotIn("marker_names", default.arguments)  # the service leaves such names to numbers
         self.assertEqual(len(wellspace.read(path, triangles=False).points), 3)
         path = self.write("part.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 1\n3 0 1 2\n")
         self.assertIsInstance(wellspace.read(path), CloudFile)

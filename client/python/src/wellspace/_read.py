@@ -57,7 +57,7 @@ class DomainFile:
     points : (n, 2) float64
     arguments : dict of str to Any
         Of `wellspace.mesh`, as far as the file has them: `segments` and `markers`, `open_segments` and `open_markers`,
-        `groups`, `faces`, `holes` and `regions`.
+        `groups`, `faces`, `holes` and `regions`, `marker_names` and `region_names`.
     notes : tuple of str
         What of the file was changed, or not used, a sentence each.
     """
@@ -182,7 +182,14 @@ def _arguments_of_domain(found: dict[str, Any]) -> dict[str, Any]:
         regions.append(RegionPolygon(int(before[int(first)]), int(count), int(region), bound))
     if regions:
         arguments["regions"] = regions
-    return arguments
+    names = (("marker_names", _names(found, "marker")), ("region_names", _names(found, "region")))
+    return {**arguments, **{name: given for name, given in names if given}}
+
+
+def _names(found: dict[str, Any], part: str) -> dict[int, str]:
+    if f"{part}_names" not in found:
+        return {}
+    return dict(zip(found[f"named_{part}s"].tolist(), found[f"{part}_names"].tolist()))
 
 
 def _surface(points: Floats, found: dict[str, Any]) -> SurfaceFile:
@@ -190,7 +197,7 @@ def _surface(points: Floats, found: dict[str, Any]) -> SurfaceFile:
         points=points,
         triangles=found["triangles"],
         markers=found.get("markers", np.zeros(len(found["triangles"]), np.int32)),
-        names=dict(zip(found["name_markers"].tolist(), found["names"].tolist())),
+        names=_names(found, "marker"),
         weld=float(found["weld"][0]),
         solids=str(found["solids"][0]),
         holes=found["holes"],

@@ -60,11 +60,19 @@ class SurfaceFile:
     def arguments(self) -> dict[str, Any]:
         """Of `wellspace.mesh`: ``wellspace.mesh(part.points, **part.arguments)`` meshes the inside."""
         given = {"triangles": self.triangles, "markers": self.markers, "solids": self.solids, "weld": self.weld}
+        if names := {marker: name for marker, name in self.names.items() if _is_part_name(name)}:
+            given["marker_names"] = names
         if len(self.holes):
             given["holes"] = self.holes
         if self.regions:
             given["regions"] = self.regions
         return given
+
+
+def _is_part_name(name: str) -> bool:
+    """Whether the service takes it for the name of a part: core/features/part_names.h says which."""
+    is_default = re.fullmatch(r"(marker|region)_[-0-9]+|unmarked|domain", name) is not None
+    return 0 < len(name.encode()) <= 255 and not is_default and not re.search(r"[\x00-\x1f\x7f]", name)
 
 
 def read_surface(path: str | os.PathLike[str]) -> SurfaceFile:
