@@ -68,7 +68,12 @@ TEST(PartNamesTest, PartsOfADomainInThePlaneHaveThem) {
   const std::vector<int32_t> markers = {5, 5, 5, 9, 9, 9, 0};
   const FaceSeed seed{.at = {1.5, 0.5}, .region = 7};
   const PartNames names{.markers = {{0, "between"}, {5, "inlet"}, {6, "nowhere"}}, .regions = {{7, "steel"}}};
-  Features features{.ends = ends, .markers = markers, .seeds = {&seed, 1}, .faces = FaceRule::kHoles, .names = &names};
+  Features features;
+  features.ends = ends;
+  features.markers = markers;
+  features.seeds = {&seed, 1};
+  features.faces = FaceRule::kHoles;
+  features.names = &names;
   RunContext context;
   MeshParameters parameters;
   parameters.dimension = 2;

@@ -439,7 +439,7 @@ TEST_F(ReadGeoJsonTest, LinesMayEndInAnyWay) {
 TEST_F(ReadGeoJsonTest, CutFilesAreRefused) {
   const std::string text = Features({Feature(Geometry("Polygon", "[" + Square(0, 0, 1) + "]"), R"({"a":[1,{}]})")});
   for (size_t size = 0; size < text.size(); ++size) {
-    const absl::StatusOr<PlanarDomain> domain = ReadGood("a.geojson", text.substr(0, size));
+    const absl::StatusOr<PlanarDomain> domain = Read("a.geojson", text.substr(0, size));
     EXPECT_EQ(domain.status().code(), absl::StatusCode::kInvalidArgument) << size;
     EXPECT_THAT(domain.status().message(), HasSubstr("a.geojson:1: ")) << size;
   }
