@@ -11,6 +11,7 @@
 
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "client/printable.h"
 #include "core/base/status_macros.h"
 #include "core/features/part_names.h"
 
@@ -41,7 +42,15 @@ void AddTable(CLI::App& command, const char* option, Table& table, const std::st
       ->type_name("NUMBER=NAME");
 }
 
-absl::Status CheckTable(const char* option, core::PartNames names) {
+absl::Status CheckTable(const char* option, const core::PartNames& names) {
+  for (const Table* const table : {&names.markers, &names.regions}) {
+    for (const auto& [number, name] : *table) {
+      if (const std::string shown = client::Printable(name); shown != name) {
+        return absl::InvalidArgumentError(absl::StrCat(
+            option, ": expected a name in UTF-8 without control characters for ", number, ", got ", shown));
+      }
+    }
+  }
   const absl::Status status = core::CheckPartNames(names);
   return status.ok() ? status : absl::InvalidArgumentError(absl::StrCat(option, ": ", status.message()));
 }
@@ -72,8 +81,9 @@ absl::Status PartNameOptions::Check() const {
 }
 
 void AddPartNames(const std::map<int32_t, std::string>& of_file, std::map<int32_t, std::string>& names) {
-  std::copy_if(of_file.begin(), of_file.end(), std::inserter(names, names.end()),
-               [](const auto& row) { return core::IsPartName(row.second); });
+  std::copy_if(of_file.begin(), of_file.end(), std::inserter(names, names.end()), [](const auto& row) {
+    return core::IsPartName(row.second) && client::Printable(row.second) == row.second;
+  });
 }
 
 client::PartNames Joined(client::PartNames of_file, const client::PartNames& given) {

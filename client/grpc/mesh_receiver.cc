@@ -11,6 +11,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/grpc/convert.h"
 #include "client/grpc/mesh_values.h"
+#include "client/printable.h"
 #include "core/base/status_macros.h"
 #include "proto/checksum.h"
 
@@ -61,13 +62,12 @@ auto VisitArray(const v1::MeshChunk& chunk, int array, Visit visit) {
   }
 }
 
-// Names go to files of text, where they stand in quotes or between blanks.
+// Names go to terminals, and to files of text.
 absl::Status CheckName(const std::string& name) {
-  constexpr size_t kMostLetters = 256;
-  const bool is_visible = std::all_of(name.begin(), name.end(), [](char c) { return c > ' ' && c < 0x7f && c != '"'; });
-  return name.empty() || name.size() > kMostLetters || !is_visible
+  constexpr size_t kMostBytes = 256;
+  return name.empty() || name.size() > kMostBytes || Printable(name) != name
              ? Contradiction("a part of the mesh with a name of ", name.size(),
-                             " bytes that cannot be; names are of visible ASCII letters")
+                             " bytes that cannot be; names are of characters that are none of control")
              : absl::OkStatus();
 }
 

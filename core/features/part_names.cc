@@ -40,8 +40,13 @@ bool IsNumberedName(std::string_view prefix, std::string_view name) {
 
 bool IsPartName(const std::string& name) {
   const auto is_control = [](char c) { return (c >= 0 && c < ' ') || c == 0x7f; };
+  // Those of Latin-1, from U+0080 to U+009F.
+  const auto is_control_pair = [](char first, char second) {
+    return first == '\xc2' && static_cast<unsigned char>(second) >= 0x80 && static_cast<unsigned char>(second) < 0xa0;
+  };
   return !name.empty() && name.size() <= kLongestPartName && std::none_of(name.begin(), name.end(), is_control) &&
-         name != "unmarked" && name != "domain" && !IsNumberedName("marker_", name) && !IsNumberedName("region_", name);
+         std::adjacent_find(name.begin(), name.end(), is_control_pair) == name.end() && name != "unmarked" &&
+         name != "domain" && !IsNumberedName("marker_", name) && !IsNumberedName("region_", name);
 }
 
 absl::Status CheckPartNames(const PartNames& names) {

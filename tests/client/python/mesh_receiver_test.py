@@ -122,7 +122,7 @@ class MeshReceiverTest(Case):
             (lambda m: m.boundary.add(tag=1, name="again"), "with that of another"),
             (lambda m: m.boundary.add(tag=0, name="none"), "not above 0"),
             (lambda m: m.regions.add(id=-1, name="none"), "not above 0"),
-            (lambda m: m.regions.add(id=2, name="two words"), "'two words'"),
+            (lambda m: m.regions.add(id=2, name="two\nlines"), "'two\\nlines'"),
             (lambda m: m.regions.add(id=2, name=""), "with the name ''"),
         ):
             message = metadata()

@@ -29,7 +29,7 @@ TEST(PartNamesTest, TextOfAnyLanguageIsAName) {
 }
 
 TEST(PartNamesTest, RefusalsNameTheNumber) {
-  for (const char* name : {"", "a\nb", "\x7f", "marker_8", "region_-3", "unmarked", "domain"}) {
+  for (const char* name : {"", "a\nb", "\x7f", "a\xc2\x9b", "marker_8", "region_-3", "unmarked", "domain"}) {
     EXPECT_THAT(ErrorOf({.markers = {{7, name}}, .regions = {}}), HasSubstr("names.markers[7]: expected a name"))
         << name;
     EXPECT_THAT(ErrorOf({.markers = {}, .regions = {{-7, name}}}), HasSubstr("names.regions[-7]: expected a name"));

@@ -269,13 +269,13 @@ def _check_known(name: str, what: str, values: npt.NDArray[Any], known: list[int
 
 
 def _check_names(m: Any) -> None:
-    """Tags and regions are above 0, each once; names go to files, where they stand between blanks or in quotes."""
+    """Tags and regions are above 0, each once; names go to terminals and to files of text."""
     for what, numbers in (("part of the boundary", [part.tag for part in m.boundary]),
                           ("region", [region.id for region in m.regions])):
         if len(set(numbers)) != len(numbers) or any(number <= 0 for number in numbers):
             raise damaged(f"a {what} with a number that is not above 0, or with that of another")
     for part in [*m.boundary, *m.regions]:
-        if not re.fullmatch(r'[!#-~]{1,256}', part.name):
+        if not re.fullmatch(r"[^\x00-\x1f\x7f-\x9f]{1,256}", part.name):
             raise damaged(f"a part of the mesh with the name {part.name[:20]!r}")
     if sum(part.facet_count for part in m.boundary) != m.facet_count:
         raise damaged(f"parts of the boundary have other facets than {m.facet_count} in all")
