@@ -161,7 +161,7 @@ absl::StatusOr<Made> Work(const MesherFactory& create_mesher, const Session& ses
   return made;
 }
 
-// Ends `operation`, or comes again until there is room on the disk for its end.
+// Ends `operation`, or comes again until there is room on the disk for its end, and a store that takes it.
 void EndWhenPossible(const CallEnvironment& environment, const std::shared_ptr<Session>& session,
                      const std::shared_ptr<Operation>& operation, const std::shared_ptr<WorkResult>& result) {
   if (!session->EndWork(*operation, *result)) {

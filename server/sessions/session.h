@@ -284,8 +284,8 @@ class Session {
   // Takes back the work of BeginWork, and ends the operation. One whose job was cancelled while no client has asked for
   // it, and which the log keeps, is not ended: the next process goes on with it.
   //
-  // False:      the log has no room for the end, and nothing is done but that a `result` that was OK is an error now.
-  //             To be called again after a while.
+  // False:      the log has no room for the end, or its store is away, and nothing is done but that a `result` that was
+  //             OK is an error now. To be called again after a while.
   bool EndWork(Operation& operation, WorkResult& result);
   // Ends an operation that still waits for a worker as CANCELLED. Of one that runs it is noted that a client has asked
   // for its end. Returns the job that the caller is to cancel, which one that runs has; null if there is none, or the

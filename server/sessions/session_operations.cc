@@ -201,7 +201,9 @@ bool Session::EndWork(Operation& operation, WorkResult& result) {
       const auto record = std::make_shared<const store::v1::OperationRecord>(
           is_parked ? operation.RecordOfParking() : operation.RecordOfFailure(clock_.wall(), result.status));
       SessionChange change = OperationChange(*state(), *record);
-      if (absl::IsResourceExhausted(Make(change, [] {}))) {
+      // A failure that is not written down is no end: the next owner would go on with the operation.
+      if (const absl::Status made = Make(change, [] {});
+          absl::IsResourceExhausted(made) || (absl::IsUnavailable(made) && !is_parked)) {
         return false;
       }
       if (is_parked) {

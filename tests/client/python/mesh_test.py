@@ -108,7 +108,7 @@ class MeshTest(Case):
         self.assertEqual([len(a) for a in (bare.facets, bare.facet_tags, bare.regions, bare.vertex_tags)], [0] * 4)
         with self.fails(InvalidArgumentError, "none: the mesh has no boundary"):
             bare.boundary("xmin")
-        with self.fails(InvalidArgumentError, "there are 'xmin', 'xmax', 'ymin', 'ymax'", field="name"):
+        with self.fails(InvalidArgumentError, "there are 1: 'xmin', 2: 'xmax', 3: 'ymin', 4: 'ymax'", field="name"):
             full.boundary("left")
         with self.fails(InvalidArgumentError, "there are 'domain'"):
             full.region("steel")
