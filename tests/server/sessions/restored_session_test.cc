@@ -20,6 +20,21 @@
 namespace wellspace::server {
 namespace {
 
+// Records that can be away for a while, as a database is that is started again.
+class AbsentRecords : public PassingRecords {
+ public:
+  AbsentRecords(std::shared_ptr<SessionLog> log, const bool& are_absent)
+      : PassingRecords(std::move(log)), are_absent_(are_absent) {}
+
+  absl::Status Apply(const SessionChange& change, Survives survives) override {
+    return are_absent_ ? MakeError(v1::ERROR_REASON_STORE_FAILED, "the records are away")
+                       : PassingRecords::Apply(change, survives);
+  }
+
+ private:
+  const bool& are_absent_;
+};
+
 class RestoredSessionTest : public ::testing::Test {
  protected:
   RestoredSessionTest() {
@@ -34,7 +49,7 @@ class RestoredSessionTest : public ::testing::Test {
     session_ = nullptr;
     registry_.reset();
     log_ = nullptr;
-    log_ = OpenDurableLog({.folder = folder_.path()}).value();
+    log_ = LogAround<AbsentRecords>(OpenDurableLog({.folder = folder_.path()}).value(), are_absent_);
     registry_.emplace(options_, memory_, Clock{.since_boot = [this] { return since_boot_; }}, *log_);
     const StoredSessions before = log_->records().Load().value();
     for (const StoredSession& stored : before.sessions) {
@@ -68,6 +83,7 @@ class RestoredSessionTest : public ::testing::Test {
   }
 
   absl::Duration since_boot_ = absl::Hours(1);
+  bool are_absent_ = false;  // the records
   MesherFactory script_ = ScriptedMesher([](core::Phase, core::RunContext&) { return absl::OkStatus(); });
   TestFolder folder_;
   ServiceOptions options_;
@@ -98,6 +114,21 @@ TEST_F(RestoredSessionTest, AnOperationInWhichThreeProcessesDiedIsNotTriedAgain)
   EXPECT_TRUE(session_->Append(0, std::vector<double>{0, 0}, 0).ok()) << "the session is free";
   StartProcess();
   EXPECT_EQ(session_->FindOperation(name).value()->Describe().state(), v1::Operation::STATE_FAILED);
+}
+
+TEST_F(RestoredSessionTest, AFailureThatIsNotWrittenDownIsNoEnd) {
+  const std::shared_ptr<Operation> operation = StartOperation();
+  std::optional<SessionWork> work = session_->BeginWork(*operation);
+  ASSERT_TRUE(work.has_value());
+  WorkResult result{.status = absl::InternalError("it failed"), .work = *std::move(work), .mesh = nullptr};
+  are_absent_ = true;
+  EXPECT_FALSE(session_->EndWork(*operation, result)) << "it is to come again";
+  EXPECT_FALSE(operation->HasEnded()) << "the next process would go on with it";
+  are_absent_ = false;
+  EXPECT_TRUE(session_->EndWork(*operation, result));
+  EXPECT_EQ(operation->Describe().state(), v1::Operation::STATE_FAILED);
+  StartProcess();
+  EXPECT_EQ(resumed_, nullptr);
 }
 
 TEST_F(RestoredSessionTest, AnOperationThatOnlyWaitedIsNoSuspect) {
