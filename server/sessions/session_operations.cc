@@ -201,9 +201,10 @@ bool Session::EndWork(Operation& operation, WorkResult& result) {
       const auto record = std::make_shared<const store::v1::OperationRecord>(
           is_parked ? operation.RecordOfParking() : operation.RecordOfFailure(clock_.wall(), result.status));
       SessionChange change = OperationChange(*state(), *record);
+      const absl::Status made = Make(change, [] {});
       // A failure that is not written down is no end: the next owner would go on with the operation.
-      if (const absl::Status made = Make(change, [] {});
-          absl::IsResourceExhausted(made) || (absl::IsUnavailable(made) && !is_parked)) {
+      const bool is_store_away = absl::IsUnavailable(made) && !is_parked && !IsElsewhere();
+      if (absl::IsResourceExhausted(made) || is_store_away) {
         return false;
       }
       if (is_parked) {

@@ -110,7 +110,7 @@ class MeshTest(Case):
             bare.boundary("xmin")
         with self.fails(InvalidArgumentError, "there are 1: 'xmin', 2: 'xmax', 3: 'ymin', 4: 'ymax'", field="name"):
             full.boundary("left")
-        with self.fails(InvalidArgumentError, "there are 'domain'"):
+        with self.fails(InvalidArgumentError, "there are 1: 'domain'"):
             full.region("steel")
 
     def test_one_mesh_for_one_input(self):
