@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
-#include "client/json/json.h"
+#include "client/rule_names.h"
 
 namespace wellspace::cli {
 namespace {

@@ -3,6 +3,7 @@
 #define WELLSPACE_CLIENT_CLI_JSON_H_
 
 #include "client/json/json.h"
+#include "client/rule_names.h"
 
 namespace wellspace::cli {
 

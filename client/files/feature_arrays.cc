@@ -10,38 +10,13 @@
 #include <vector>
 
 #include "client/formats/numpy/npz_file.h"
+#include "client/rule_names.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::client {
 namespace {
 
 using formats::NpzFile;
-
-const char* NameOf(FaceRule rule) {
-  switch (rule) {
-    case FaceRule::kBox:
-      return "box";
-    case FaceRule::kHoles:
-      return "holes";
-    case FaceRule::kEvenOdd:
-      return "even-odd";
-    case FaceRule::kUnion:
-      break;
-  }
-  return "union";
-}
-
-const char* NameOf(SolidRule rule) {
-  switch (rule) {
-    case SolidRule::kEvenOdd:
-      return "even-odd";
-    case SolidRule::kHoles:
-      return "holes";
-    case SolidRule::kWinding:
-      break;
-  }
-  return "winding";
-}
 
 double BoundOf(const std::optional<double>& bound) { return bound.value_or(std::numeric_limits<double>::infinity()); }
 
@@ -126,7 +101,7 @@ absl::Status WriteFeatureArrays(const std::string& path, const formats::PointClo
   WriteIfAny("markers.npy", features.markers, *file);
   WriteIfAny("is_open.npy", features.is_open, *file);
   WriteIfAny("groups.npy", features.groups, *file);
-  WriteText("faces.npy", NameOf(features.faces), *file);
+  WriteText("faces.npy", FaceRuleName(features.faces), *file);
   WriteNames(features.names, *file);
   WriteSeeds(features.seeds, *file);
   return file->Commit();
@@ -138,7 +113,7 @@ absl::Status WriteFeatureArrays(const std::string& path, const formats::PointClo
   WriteRows("points.npy", points.points, points.dimension, *file);
   WriteRows("triangles.npy", features.corners, 3, *file);
   WriteIfAny("markers.npy", features.markers, *file);
-  WriteText("solids.npy", NameOf(features.solids), *file);
+  WriteText("solids.npy", SolidRuleName(features.solids), *file);
   WriteNames(features.names, *file);
   const double weld[] = {features.weld.value_or(0)};
   file->WriteArray("weld.npy", std::span<const double>(weld));

@@ -38,10 +38,6 @@ const char* StateName(SessionState state);
 const char* StateName(OperationState state);
 // As --criterion has it.
 const char* CriterionName(Criterion criterion);
-// As --faces has it.
-const char* FaceRuleName(FaceRule rule);
-const char* CrossingRuleName(CrossingRule rule);
-const char* SolidRuleName(SolidRule rule);
 // "2026-01-31T23:59:59Z".
 std::string TimeText(absl::Time time);
 
