@@ -210,6 +210,8 @@ class CloudMaker {
 
   // Finds the places of the points that triangles at meshed solids have for corners, but for corners of curves.
   absl::Status FindKept() {
+    const uint64_t held = domain_->MemoryBytes() + complex().points.size() * sizeof(SpacePlace);
+    WELLSPACE_RETURN_IF_ERROR(context_.AllowMemory(held));
     place_of_kept_.resize(complex().points.size());
     uint64_t count = 0;
     const auto keep = [&](uint32_t point, const SpacePlace& place) {
@@ -240,7 +242,7 @@ class CloudMaker {
                                                        " points for corners, more than max_vertices = ", max_vertices_,
                                                        "; raise it, or leave keep_points out"));
     }
-    return context_.AllowMemory(domain_->MemoryBytes() + count * kBytesOfFirst);
+    return context_.AllowMemory(held + count * kBytesOfFirst);
   }
 
   // Takes the given points that are vertices: corners, points on no triangle in a solid that is meshed, and those that
@@ -291,6 +293,7 @@ class CloudMaker {
         TakePoint(i, point, {SpacePlace::Kind::kSolid, solid, distance});
       }
     }
+    place_of_kept_ = {};
     return absl::OkStatus();
   }
 

@@ -163,19 +163,27 @@ class Wrapper {
     return absl::OkStatus();
   }
 
-  // Adds the cells that triangles meet, and some beside them.
-  absl::Status FindMetCells() {
-    const auto add = [this](const Triangle& piece, const LongestEdge& longest) -> absl::StatusOr<bool> {
+  // Calls visit(piece) for pieces of all given triangles, none of them longer than a cell.
+  template <typename Visit>
+  absl::Status ForEachSmallPiece(const Visit& visit) const {
+    const auto visit_small = [&](const Triangle& piece, const LongestEdge& longest) -> absl::StatusOr<bool> {
       if (longest.length_sq > cell_ * cell_) {
         return true;
       }
-      WELLSPACE_RETURN_IF_ERROR(AddCellsOf(BoxOfTriangle(piece)));
+      WELLSPACE_RETURN_IF_ERROR(visit(piece));
       return false;
     };
     for (uint32_t t = 0; t < complex_.triangles.size(); ++t) {
       WELLSPACE_RETURN_IF_ERROR(CheckAt(t, context_));
-      WELLSPACE_RETURN_IF_ERROR(ForEachPiece(complex_.InOrderAt(t), context_, add));
+      WELLSPACE_RETURN_IF_ERROR(ForEachPiece(complex_.InOrderAt(t), context_, visit_small));
     }
+    return absl::OkStatus();
+  }
+
+  // Adds the cells that triangles meet, and some beside them.
+  absl::Status FindMetCells() {
+    WELLSPACE_RETURN_IF_ERROR(
+        ForEachSmallPiece([this](const Triangle& piece) { return AddCellsOf(BoxOfTriangle(piece)); }));
     return CancellableSort(cells_, std::less<GridKey>(), context_);
   }
   absl::Status AddCellsOf(const Box<3>& box) {
@@ -361,20 +369,13 @@ class Wrapper {
       cells.insert(CellOf(MiddleOf({out_.points[a], out_.points[b], out_.points[c]})));
     }
     uint64_t parts = 0;  // whole numbers: their sum is the same in any order
-    const auto add = [&](const Triangle& piece, const LongestEdge& longest) -> absl::StatusOr<bool> {
-      if (longest.length_sq > cell_ * cell_) {
-        return true;
-      }
+    WELLSPACE_RETURN_IF_ERROR(ForEachSmallPiece([&](const Triangle& piece) {
       const GridKey cell = CellOf(MiddleOf(piece));
       if (!IsInside(cell) && !HasNear(cells, cell)) {
         parts += static_cast<uint64_t>(AreaOf(piece) / (cell_ * cell_) * kPartsOfCell);
       }
-      return false;
-    };
-    for (uint32_t t = 0; t < complex_.triangles.size(); ++t) {
-      WELLSPACE_RETURN_IF_ERROR(CheckAt(t, context_));
-      WELLSPACE_RETURN_IF_ERROR(ForEachPiece(complex_.InOrderAt(t), context_, add));
-    }
+      return absl::OkStatus();
+    }));
     out_.lost_area = static_cast<double>(parts) / kPartsOfCell * cell_ * cell_;
     return absl::OkStatus();
   }
