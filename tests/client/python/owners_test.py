@@ -162,7 +162,7 @@ class OwnersTest(Case):
         self.assertEqual(self.first.count("GetSession"), 5, "it has the session now")
 
     def test_a_server_that_stays_away_is_named(self):
-        with socket.socket() as bound:  # nobody listens
+        with socket.socket() as bound:  # it does not listen
             bound.bind(("127.0.0.1", 0))
             address = f"127.0.0.1:{bound.getsockname()[1]}"
             session = self.session()

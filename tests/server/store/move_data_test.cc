@@ -1,4 +1,4 @@
-// Records that move between a folder and PostgreSQL: all of them are there, and nobody has them twice.
+// Records that move between a folder and PostgreSQL: all of them are there, and none is in both places.
 #include "server/store/move_data.h"
 
 #include <filesystem>
