@@ -72,6 +72,7 @@ absl::StatusCode CodeOf(v1::ErrorReason reason) {
     case v1::ERROR_REASON_DOMAIN_FIXED:
     case v1::ERROR_REASON_WORK_CRASHED:
     case v1::ERROR_REASON_DELTA_NOT_KEPT:
+    case v1::ERROR_REASON_MESH_NOT_KEPT:
       return absl::StatusCode::kFailedPrecondition;
     case v1::ERROR_REASON_REVISION_MISMATCH:
       return absl::StatusCode::kAborted;
