@@ -18,9 +18,8 @@ namespace wellspace::cli {
 const char kCloudsHelp[] =
     "Clouds:  .csv .tsv .txt .dat (columns separated by commas, semicolons or blanks; a header may name x, y, z, or\n"
     "         lon, lat and the like), .xyz, .asc, .pts, .node, .npy, .pcd, .las, vertices of .ply, .obj, .off, .stl,\n"
-    "         .vtk, .vtp, .vts, .vtu, .msh, .mesh, .14, .2dm and .npz; each but .npz may be compressed (.csv.gz); "
-    "\"-\" is\n"
-    "         standard input (csv, or --input-format)\n"
+    "         .vtk, .vtp, .vts, .vtu, .vtr, .vti, these of pieces (.pvtu), .msh, .mesh, .14, .2dm and .npz; each but\n"
+    "         .npz may be compressed (.csv.gz); \"-\" is standard input (csv, or --input-format)\n"
     "Domains: in 2-D, .poly (Triangle's, with .node), .geojson, .geojsonl, .ndjson, .wkt and .shp; with --segments\n"
     "         lines of .obj, polylines of .csv and boundaries of .14 (ADCIRC)\n"
     "         in 3-D, the inside of a surface: .stl (--as-points: a cloud), .smesh and 3-D .poly (TetGen's);\n"

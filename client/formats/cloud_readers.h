@@ -32,6 +32,14 @@ absl::Status ReadLas(LineReader& reader, const CloudOptions& options, PointCloud
 absl::Status ReadVtkPoints(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
 absl::Status ReadVtp(InputFile& file, const CloudOptions& options, PointCloud& cloud);
 absl::Status ReadVts(InputFile& file, const CloudOptions& options, PointCloud& cloud);
+absl::Status ReadVtr(InputFile& file, const CloudOptions& options, PointCloud& cloud);
+absl::Status ReadVti(InputFile& file, const CloudOptions& options, PointCloud& cloud);
+// The same of files of pieces: each piece is a file beside it.
+absl::Status ReadPvtp(InputFile& file, const CloudOptions& options, PointCloud& cloud);
+absl::Status ReadPvts(InputFile& file, const CloudOptions& options, PointCloud& cloud);
+absl::Status ReadPvtu(InputFile& file, const CloudOptions& options, PointCloud& cloud);
+absl::Status ReadPvtr(InputFile& file, const CloudOptions& options, PointCloud& cloud);
+absl::Status ReadPvti(InputFile& file, const CloudOptions& options, PointCloud& cloud);
 absl::Status ReadVtuPoints(InputFile& file, const CloudOptions& options, PointCloud& cloud);
 absl::Status ReadMshPoints(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
 absl::Status ReadMeditPoints(LineReader& reader, const CloudOptions& options, PointCloud& cloud);

@@ -60,6 +60,13 @@ std::span<const Format<CloudReader>> CloudReaders() {
       {"vtp", {".vtp"}, ReadVtp},
       {"vts", {".vts"}, ReadVts},
       {"vtu", {".vtu"}, ReadVtuPoints},
+      {"vtr", {".vtr"}, ReadVtr},
+      {"vti", {".vti"}, ReadVti},
+      {"pvtp", {".pvtp"}, ReadPvtp},
+      {"pvts", {".pvts"}, ReadPvts},
+      {"pvtu", {".pvtu"}, ReadPvtu},
+      {"pvtr", {".pvtr"}, ReadPvtr},
+      {"pvti", {".pvti"}, ReadPvti},
       {"msh", {".msh"}, ReadText<ReadMshPoints>},
       {"medit", {".mesh"}, ReadText<ReadMeditPoints>},
       {"npz", {".npz"}, ReadNpzPoints},
@@ -70,7 +77,8 @@ std::span<const Format<CloudReader>> CloudReaders() {
 }
 
 // Formats in which points have three coordinates, in the plane, too.
-constexpr std::array<std::string_view, 6> kPadded = {"vtk", "vtp", "vts", "vtu", "msh", "medit"};
+constexpr std::array<std::string_view, 13> kPadded = {"vtk",  "vtp",  "vts",  "vtu",  "vtr", "vti",  "pvtp",
+                                                      "pvts", "pvtu", "pvtr", "pvti", "msh", "medit"};
 
 // Of points that all have the same z: takes them in the plane if that is 0 and only there since the format wants it, or
 // tells how to take them so. Points of other formats have the dimension that was asked for.

@@ -29,15 +29,19 @@
 //   pcd   The Point Cloud Library's: fields x, y and, if it is there, z; data in ascii, binary or binary_compressed.
 //   las   1.0 to 1.4 of the ASPRS, point formats 0 to 10; points that are marked as withheld are left out. Compressed
 //         ones (laz) are refused: docs/adr/0034-laz-is-refused.md.
-//   vtk   VTK's legacy format in ascii or binary, of the kinds POLYDATA, UNSTRUCTURED_GRID and STRUCTURED_GRID.
-//   vtp, vts, vtu  VTK's XML, the points of all pieces, arrays as ReadMesh takes them.
+//   vtk   VTK's legacy format in ascii or binary, of the kinds POLYDATA, UNSTRUCTURED_GRID, STRUCTURED_GRID,
+//         STRUCTURED_POINTS and RECTILINEAR_GRID.
+//   vtp, vts, vtu, vtr, vti  VTK's XML, the points of all pieces, arrays as ReadMesh takes them. Of grids and images
+//         whose points are told by their axes alone, at most 2^20 points and 1024 for each byte of the file.
+//   pvtp, pvts, pvtu, pvtr, pvti  VTK's files of pieces, each of which is a file beside it; points that pieces have in
+//         common come as often.
 //   msh   Gmsh's, versions as ReadMesh takes them: all nodes, whatever the elements are.
 //   medit INRIA's .mesh in ascii: all vertices, whatever the elements are.
 //   npz   numpy's archive of arrays: the rows of `points`, as npy.
 //   adcirc, 2dm  All nodes in the plane, whatever the elements are; "depth" or "elevation" is beside them.
 // Of ply, off, msh, medit and adcirc, nothing behind the last point is looked at.
-// Points of vtk, vtp, vts, vtu, msh and medit that all have z = 0 are taken in the plane, unless three dimensions or
-// columns are asked for: these formats have a third coordinate there, too.
+// Points of vtk, the formats of VTK's XML, msh and medit that all have z = 0 are taken in the plane, unless three
+// dimensions or columns are asked for: these formats have a third coordinate there, too.
 // In those of text lines end in LF, CRLF or CR, '#' at the start of a line or after a blank starts a comment, and blank
 // lines are skipped. Numbers may have Fortran's exponents: 1.0D+00, 1.0-100. Each may be compressed by gzip, as
 // "cloud.csv.gz" or on standard input.

@@ -53,6 +53,8 @@ class LineReader {
 
   const absl::Status& status() const { return status_; }
   const std::string& name() const { return file_.name(); }
+  // In bytes; none when it is not known.
+  std::optional<uint64_t> file_size() const { return file_.size(); }
   // Of the line that was returned last; the first is 1.
   uint64_t line_number() const { return line_number_; }
   // Bytes of the file before the line that Next or Take would return.

@@ -92,9 +92,9 @@ class VtkMeshReader final : public VtkLegacyReader {
 
   absl::StatusOr<Mesh> Read() {
     WELLSPACE_RETURN_IF_ERROR(ReadSections());
-    if (dataset() == "STRUCTURED_GRID") {
+    if (dataset() != "POLYDATA" && dataset() != "UNSTRUCTURED_GRID") {
       return absl::InvalidArgumentError(
-          absl::StrCat(grid_.file, ": expected cells that are simplices, got a STRUCTURED_GRID"));
+          absl::StrCat(grid_.file, ": expected cells that are simplices, got a ", dataset()));
     }
     grid_.points = point_count();
     for (uint64_t point = 0; point < grid_.points; ++point) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <utility>
 
 #include "absl/strings/ascii.h"
@@ -48,6 +49,9 @@ bool IsWholeVtkType(const VtkType& type) { return type.name != "float" && type.n
 
 constexpr std::array<std::string_view, 6> kVtkCellSections = {"VERTICES",        "LINES", "POLYGONS",
                                                               "TRIANGLE_STRIPS", "CELLS", "CELL_TYPES"};
+
+constexpr std::array<std::string_view, 5> kVtkDatasets = {"POLYDATA", "UNSTRUCTURED_GRID", "STRUCTURED_GRID",
+                                                          "STRUCTURED_POINTS", "RECTILINEAR_GRID"};
 
 absl::string_view VtkText(std::string_view text) { return {text.data(), text.size()}; }
 
@@ -158,12 +162,9 @@ absl::Status VtkLegacyReader::ReadSection() {
   if (keyword_ == "POINTS") {
     return ReadPoints();
   }
-  if (keyword_ == "DIMENSIONS") {
-    uint64_t ignored = 0;
-    for (int axis = 0; axis < 3; ++axis) {
-      WELLSPACE_RETURN_IF_ERROR(TakeCount(kMaxCount, ignored));
-    }
-    return absl::OkStatus();
+  if (keyword_ == "DIMENSIONS" || keyword_ == "ORIGIN" || keyword_ == "SPACING" || keyword_ == "ASPECT_RATIO" ||
+      keyword_ == "X_COORDINATES" || keyword_ == "Y_COORDINATES" || keyword_ == "Z_COORDINATES") {
+    return ReadGridPart();
   }
   if (keyword_ == "METADATA") {
     return SkipMetadata();
@@ -180,13 +181,78 @@ absl::Status VtkLegacyReader::ReadSection() {
   return are_cells ? ReadCells() : ReadData();
 }
 
+// A part of a grid whose points are told by its axes. These come with its last part.
+absl::Status VtkLegacyReader::ReadGridPart() {
+  const bool is_image = dataset_ == "STRUCTURED_POINTS";
+  if (keyword_ == "DIMENSIONS") {
+    for (int axis = 0; axis < 3; ++axis) {
+      uint64_t count = 0;
+      WELLSPACE_RETURN_IF_ERROR(TakeCount(kMaxCount, count));
+      grid_.extent.last[axis] = static_cast<int64_t>(count) - 1;
+    }
+    grid_.has_dimensions = true;
+  } else if (const size_t axis = keyword_[0] - 'X'; keyword_ == "ORIGIN" || keyword_ == "SPACING" || axis > 2) {
+    std::array<double, 3>& numbers = keyword_ == "ORIGIN" ? grid_.image.origin : grid_.image.spacing;
+    (keyword_ == "ORIGIN" ? grid_.has_origin : grid_.has_spacing) = true;
+    for (double& number : numbers) {
+      const std::string word = TakeName();
+      if (absl::Status status = ParseFinite(word, number); !status.ok()) {
+        return reader_.EndError(absl::StrCat("three numbers after ", keyword_, ": ", status.message()));
+      }
+    }
+  } else {
+    const VtkType* type = nullptr;
+    uint64_t count = 0;
+    Columns numbers(1);
+    WELLSPACE_RETURN_IF_ERROR(TakeCount(kMaxCount, count));
+    WELLSPACE_RETURN_IF_ERROR(TakeType(type));
+    WELLSPACE_RETURN_IF_ERROR(ReadArray(1, count, *type, &numbers));
+    grid_.axes[axis] = std::move(numbers[0]);
+    grid_.axes_read |= 1U << axis;
+  }
+  const bool is_whole = grid_.has_dimensions && (is_image ? grid_.has_origin && grid_.has_spacing
+                                                          : dataset_ == "RECTILINEAR_GRID" && grid_.axes_read == 7);
+  return is_whole && !has_points_ ? MakeGridPoints() : absl::OkStatus();
+}
+
+absl::Status VtkLegacyReader::MakeGridPoints() {
+  constexpr uint64_t kMostUnseen = uint64_t{1} << 26;  // of a pipe, or a compressed file
+  const std::optional<uint64_t> size = reader_.file_size();
+  const uint64_t most = size.has_value() ? std::min(MostGridPoints(*size), kMaxCount) : kMostUnseen;
+  const std::optional<uint64_t> count = grid_.extent.PointCount(most);
+  if (!count.has_value()) {
+    return reader_.Error(absl::StrCat("expected DIMENSIONS of at most ", most, " points of a file of this size"));
+  }
+  const auto add = [&columns = Coordinates()](double x, double y, double z) {
+    columns[0].push_back(x);
+    columns[1].push_back(y);
+    columns[2].push_back(z);
+  };
+  if (dataset_ == "STRUCTURED_POINTS") {
+    grid_.image.ForEachPoint(grid_.extent, add);
+  } else {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      if (grid_.axes[axis].size() != grid_.extent.PointsAlong(static_cast<int>(axis))) {
+        return reader_.Error(absl::StrCat("expected ", grid_.extent.PointsAlong(static_cast<int>(axis)),
+                                          " coordinates along axis ", axis, ", as DIMENSIONS says, got ",
+                                          grid_.axes[axis].size()));
+      }
+    }
+    ForEachRectilinearPoint(grid_.axes, add);
+  }
+  point_count_ = *count;
+  has_points_ = true;
+  return absl::OkStatus();
+}
+
 absl::Status VtkLegacyReader::ReadDataset() {
   const std::string word = TakeName();
   dataset_ = absl::AsciiStrToUpper(word);
-  return dataset_ == "POLYDATA" || dataset_ == "UNSTRUCTURED_GRID" || dataset_ == "STRUCTURED_GRID"
+  return std::find(kVtkDatasets.begin(), kVtkDatasets.end(), dataset_) != kVtkDatasets.end()
              ? absl::OkStatus()
-             : reader_.Error(
-                   absl::StrCat("expected DATASET POLYDATA, UNSTRUCTURED_GRID or STRUCTURED_GRID, got ", Quote(word)));
+             : reader_.Error(absl::StrCat("expected DATASET POLYDATA, UNSTRUCTURED_GRID, STRUCTURED_GRID, "
+                                          "STRUCTURED_POINTS or RECTILINEAR_GRID, got ",
+                                          Quote(word)));
 }
 
 absl::Status VtkLegacyReader::ReadPoints() {

@@ -3,6 +3,7 @@
 #ifndef WELLSPACE_CLIENT_FORMATS_VTK_VTK_LEGACY_H_
 #define WELLSPACE_CLIENT_FORMATS_VTK_VTK_LEGACY_H_
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -11,6 +12,7 @@
 #include "absl/status/status.h"
 #include "client/formats/io/line_reader.h"
 #include "client/formats/io/number.h"
+#include "client/formats/vtk/grid_points.h"
 
 namespace wellspace::formats {
 
@@ -77,6 +79,8 @@ class VtkLegacyReader {
   absl::Status ReadSection();
   absl::Status ReadDataset();
   absl::Status ReadPoints();
+  absl::Status ReadGridPart();
+  absl::Status MakeGridPoints();
   absl::Status ReadCells();
   absl::Status ReadData();
   absl::Status ReadScalars(Data data);
@@ -109,6 +113,17 @@ class VtkLegacyReader {
   std::string keyword_;  // of the section, in upper case; of a name as messages have it
   std::string word_;     // the same as the file has it
   std::string dataset_;
+  // Of a grid whose points are told by its axes: what of it has come.
+  struct Grid {
+    VtkExtent extent;
+    VtkImage image;
+    std::array<std::vector<double>, 3> axes;
+    unsigned axes_read = 0;  // a bit for each
+    bool has_dimensions = false;
+    bool has_origin = false;
+    bool has_spacing = false;
+  };
+  Grid grid_;
   bool has_points_ = false;
   bool ends_early_ = false;  // the rest cannot be read
   Data::Of of_ = Data::Of::kFile;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <string_view>
 #include <type_traits>
 #include <utility>
@@ -102,6 +103,9 @@ absl::Status VtkXmlReader::StartElement() {
   if (element == "Piece") {
     return StartPiece();
   }
+  if (element == kind_ && path_.size() == 2) {
+    return StartDataset();
+  }
   const std::string parent = path_[path_.size() - 2];
   return element == "DataArray" ? ReadDataArray(parent) : absl::OkStatus();
 }
@@ -113,7 +117,7 @@ absl::Status VtkXmlReader::StartPiece() {
   ++pieces_;
   uint64_t points = 0;
   uint64_t cells = 0;
-  if (kind_ == "StructuredGrid") {
+  if (kind_ == "StructuredGrid" || kind_ == "RectilinearGrid" || kind_ == "ImageData") {
     WELLSPACE_RETURN_IF_ERROR(TakeExtent(points, cells));
     first_point_ = point_count_;
     point_count_ += points;
@@ -140,27 +144,30 @@ absl::Status VtkXmlReader::StartPiece() {
 }
 
 // "0 3 0 4 0 0": the first and the last point of each axis.
-absl::Status VtkXmlReader::TakeExtent(uint64_t& points, uint64_t& cells) const {
+absl::Status VtkXmlReader::TakeExtent(uint64_t& points, uint64_t& cells) {
   constexpr int64_t kLimit = std::numeric_limits<int32_t>::max();
-  std::array<int64_t, 6> ends{};
   FieldSplitter fields(xml_.Attribute("Extent"), ' ');
-  points = 1;
   cells = 1;
-  for (size_t i = 0; i < ends.size(); ++i) {
-    std::string_view field;
-    fields.Next(field);
-    if (!absl::SimpleAtoi(absl::string_view(field.data(), field.size()), &ends[i]) || ends[i] < -kLimit ||
-        ends[i] > kLimit || (i % 2 == 1 && ends[i] < ends[i - 1])) {
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int64_t* end : {&extent_.first[axis], &extent_.last[axis]}) {
+      std::string_view field;
+      fields.Next(field);
+      if (!absl::SimpleAtoi(absl::string_view(field.data(), field.size()), end) || *end < -kLimit || *end > kLimit) {
+        extent_.last[axis] = extent_.first[axis] - 1;
+        break;
+      }
+    }
+    if (extent_.last[axis] < extent_.first[axis]) {
       return xml_.Error("expected Extent in <Piece>, six whole numbers, of each axis first the lower one");
     }
-    if (i % 2 == 1) {
-      const auto length = static_cast<uint64_t>(ends[i] - ends[i - 1]);
-      if (length + 1 > (kMaxCount - point_count_) / points) {
-        return xml_.Error("expected an Extent of fewer than 2^32 points in <Piece>");
-      }
-      points *= length + 1;
-      cells *= std::max<uint64_t>(length, 1);
-    }
+  }
+  const std::optional<uint64_t> count = extent_.PointCount(kMaxCount - point_count_);
+  if (!count.has_value()) {
+    return xml_.Error("expected an Extent of fewer than 2^32 points in <Piece>");
+  }
+  points = *count;
+  for (int axis = 0; axis < 3; ++axis) {
+    cells *= std::max<uint64_t>(extent_.PointsAlong(axis) - 1, 1);
   }
   return absl::OkStatus();
 }

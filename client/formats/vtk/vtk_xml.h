@@ -10,6 +10,7 @@
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
+#include "client/formats/vtk/grid_points.h"
 #include "client/formats/vtk/vtk_array.h"
 #include "client/formats/vtk/xml_scanner.h"
 
@@ -32,6 +33,8 @@ class VtkXmlReader {
   // The element <DataArray> whose start tag was read last; `parent` is the element around it. It may read the array by
   // ReadArray or ReadAnyNumbers.
   virtual absl::Status ReadDataArray(const std::string& parent) = 0;
+  // The element of the kind, around all pieces, has begun.
+  virtual absl::Status StartDataset() { return absl::OkStatus(); }
   // All arrays of a piece have come, or been left out.
   virtual absl::Status EndPiece() { return absl::OkStatus(); }
 
@@ -45,6 +48,8 @@ class VtkXmlReader {
   uint64_t point_count() const { return point_count_; }
   uint64_t cell_count() const { return cell_count_; }
   uint64_t first_point() const { return first_point_; }
+  // Of the piece of a grid that is being read.
+  const VtkExtent& extent() const { return extent_; }
 
   absl::Status FileError(std::string_view message) const {
     return absl::InvalidArgumentError(absl::StrCat(name_, ": ", absl::string_view(message.data(), message.size())));
@@ -67,7 +72,7 @@ class VtkXmlReader {
   absl::Status StartElement();
   absl::Status StartFile();
   absl::Status StartPiece();
-  absl::Status TakeExtent(uint64_t& points, uint64_t& cells) const;
+  absl::Status TakeExtent(uint64_t& points, uint64_t& cells);
 
   // The text of the current element, an array; none if it has none.
   absl::Status TakeText(std::string_view& text);
@@ -95,6 +100,7 @@ class VtkXmlReader {
   uint64_t first_point_ = 0;
   uint64_t point_count_ = 0;
   uint64_t cell_count_ = 0;
+  VtkExtent extent_;
 };
 
 }  // namespace wellspace::formats

@@ -255,6 +255,62 @@ class Programs(unittest.TestCase):
                     self.write_by_vtk(writer_of_vtk, data, "theirs.vtk")
                     self.assert_cloud("theirs.vtk", expected)
 
+    def test_we_read_grids_of_vtk_that_are_told_by_their_axes(self):
+        import vtk
+        image = vtk.vtkImageData()
+        image.SetExtent(-1, 2, 3, 6, 0, 2)
+        image.SetOrigin(0.1, -7.3, 1e6)
+        image.SetSpacing(0.1, 1 / 3, 7.7)
+        image.SetDirectionMatrix(0.6, -0.8, 0, 0.8, 0.6, 0, 0, 0, 1)
+        grid = vtk.vtkRectilinearGrid()
+        grid.SetExtent(-1, 2, 3, 6, 0, 2)
+        for axis, count in (("X", 4), ("Y", 4), ("Z", 3)):
+            numbers = vtk.vtkDoubleArray()
+            for i in range(count):
+                numbers.InsertNextValue(i * i / 3 - count)
+            getattr(grid, f"Set{axis}Coordinates")(numbers)
+        for data, kind in ((image, "ImageData"), (grid, "RectilinearGrid")):
+            suffix = {"ImageData": "vti", "RectilinearGrid": "vtr"}[kind]
+            expected = numpy.array([data.GetPoint(i) for i in range(data.GetNumberOfPoints())])
+            values = vtk.vtkFloatArray()
+            values.SetName("h")
+            for i in range(len(expected)):
+                values.InsertNextValue(i)
+            data.GetPointData().AddArray(values)
+            for mode in ("Ascii", "Binary", "Appended"):
+                with self.subTest(kind=kind, mode=mode):
+                    writer = getattr(vtk, f"vtkXML{kind}Writer")()
+                    getattr(writer, f"SetDataModeTo{mode}")()
+                    self.write_by_vtk(writer, data, f"theirs.{suffix}")
+                    if mode == "Ascii" and kind == "RectilinearGrid":
+                        self.assert_cloud(f"theirs.{suffix}", expected, "float32")
+                    else:
+                        self.assert_cloud(f"theirs.{suffix}", expected)
+            with self.subTest(kind=kind, pieces=4):
+                writer = getattr(vtk, f"vtkXMLP{kind}Writer")()
+                writer.SetNumberOfPieces(4)
+                writer.SetStartPiece(0)
+                writer.SetEndPiece(3)
+                self.write_by_vtk(writer, data, f"theirs.p{suffix}")
+                self.run_program(CONVERT_MESH, "--cloud", f"theirs.p{suffix}", "cloud.npz")
+                with numpy.load(self.folder / "cloud.npz") as cloud:
+                    self.assertEqual({tuple(point) for point in cloud["points"]},
+                                     {tuple(point) for point in expected})
+            for file_type in (1, 2):
+                with self.subTest(kind=kind, file_type=file_type):
+                    plain = data.NewInstance()
+                    plain.DeepCopy(data)
+                    if kind == "ImageData":  # the legacy format knows no direction, and 6 digits of an origin
+                        plain.SetDirectionMatrix(1, 0, 0, 0, 1, 0, 0, 0, 1)
+                        plain.SetOrigin(0.5, -7.25, 1000)
+                        plain.SetSpacing(0.125, 0.25, 7.5)
+                    writer = {"ImageData": vtk.vtkStructuredPointsWriter,
+                              "RectilinearGrid": vtk.vtkRectilinearGridWriter}[kind]()
+                    writer.SetFileType(file_type)
+                    self.write_by_vtk(writer, plain, "theirs.vtk")
+                    wanted = [plain.GetPoint(i) for i in range(plain.GetNumberOfPoints())]
+                    self.assert_cloud("theirs.vtk", wanted, "float32" if kind == "RectilinearGrid" else "float64")
+
     def write_by_vtk(self, writer, data, name):
         writer.SetFileName(str(self.folder / name))
         writer.SetInputData(data)
