@@ -8,7 +8,7 @@ namespace wellspace::core {
 
 // Two builds of one version make, to the bit, the same mesh of the same steps. To be raised with every change that
 // makes another mesh of any input: logs of sessions that were written by another version are then not taken again.
-inline constexpr uint32_t kMeshingVersion = 1;
+inline constexpr uint32_t kMeshingVersion = 2;
 
 }  // namespace wellspace::core
 

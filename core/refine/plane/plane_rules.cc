@@ -221,26 +221,36 @@ SteinerPoint<2> PlaneRules::CandidateIn(size_t sector, VertexId v, const Polytop
                                         std::span<const uint32_t> segments, const Assessment& found, bool is_at_segment,
                                         double edge_limit_sq, StepRules<2>::CellOf cell_of,
                                         Workspace<2>& workspace) const {
-  const auto find_segments = [&](const SteinerPoint<2>& point) {
-    workspace.segments.insert(workspace.segments.end(), segments.begin(), segments.end());
-    std::erase_if(workspace.segments, [&](uint32_t segment) {
-      return domain().DistanceSqTo(point.position, segment) > point.empty_radius_sq;
-    });
-  };
   workspace.segments.clear();
-  SteinerPoint<2> candidate = rules_.CandidateFor(v, cell, found, is_at_segment, edge_limit_sq, cell_of);
-  find_segments(candidate);
+  const SteinerPoint<2> candidate = rules_.CandidateFor(v, cell, found, is_at_segment, edge_limit_sq, cell_of);
+  AddSegmentsNear(candidate, segments, workspace);
   const bool is_beyond = std::any_of(workspace.segments.begin(), workspace.segments.end(), [&](uint32_t s) {
     return !domain().IsOn(v, s) &&
            CrossEachOther(cell.site(), candidate.position, domain().EndOf(s, false), domain().EndOf(s, true));
   });
   if (is_beyond || !LeadsInto(v, sector, candidate.position)) {
     // It is in the cell of another vertex, beyond a segment: a point of this cell takes its place.
-    candidate = rules_.OffCenterFor(cell, found, is_at_segment);
-    workspace.segments.clear();
-    find_segments(candidate);
+    return OffCenterIn(cell, segments, found, is_at_segment, workspace);
   }
   return candidate;
+}
+
+// The off-centre for the bad node, and in workspace.segments those that are nearer to it than any vertex.
+SteinerPoint<2> PlaneRules::OffCenterIn(const Polytope<2>& cell, std::span<const uint32_t> segments,
+                                        const Assessment& found, bool is_at_segment, Workspace<2>& workspace) const {
+  const SteinerPoint<2> candidate = rules_.OffCenterFor(cell, found, is_at_segment);
+  workspace.segments.clear();
+  AddSegmentsNear(candidate, segments, workspace);
+  return candidate;
+}
+
+// Adds `segments` to those in the workspace, and leaves of all those that are nearer to `point` than any vertex.
+void PlaneRules::AddSegmentsNear(const SteinerPoint<2>& point, std::span<const uint32_t> segments,
+                                 Workspace<2>& workspace) const {
+  workspace.segments.insert(workspace.segments.end(), segments.begin(), segments.end());
+  std::erase_if(workspace.segments, [&](uint32_t segment) {
+    return domain().DistanceSqTo(point.position, segment) > point.empty_radius_sq;
+  });
 }
 
 // The foot of `candidate` on the nearest of `segments`, if that is nearer than the empty radius over the square root of
@@ -279,16 +289,26 @@ PlaneRules::Answer PlaneRules::NextRequest(VertexId v, const Polytope<2>& cell, 
   }
   const NodeView view(cell, cell.nodes()[found.bad_node]);
   const size_t sector = domain().SectorToward(v, view.toward);
-  const SteinerPoint<2> candidate =
-      CandidateIn(sector, v, cell, segments, found, IsAtSegment(v, view), edge_limit_sq, cell_of, workspace);
+  const bool is_at_segment = IsAtSegment(v, view);
+  SteinerPoint<2> candidate =
+      CandidateIn(sector, v, cell, segments, found, is_at_segment, edge_limit_sq, cell_of, workspace);
   double distance_sq = 0;
-  const SegmentPoint place =
-      YieldPlace(candidate, v, LeadsInto(v, sector, candidate.position), workspace.segments, distance_sq);
+  const auto yield_place = [&] {
+    return YieldPlace(candidate, v, LeadsInto(v, sector, candidate.position), workspace.segments, distance_sq);
+  };
+  const auto has_small_angle = [&](uint32_t segment) {
+    return domain().HasSmallAngle(HalfEdgeOf(segment, false)) || domain().HasSmallAngle(HalfEdgeOf(segment, true));
+  };
+  SegmentPoint place = yield_place();
   const double rho_sq = rules_.criteria().rho * rules_.criteria().rho;
+  if (place.IsOnSegment() && is_at_segment && (rho_sq >= kSafeRhoSq || has_small_angle(place.segment))) {
+    // A point that was walked to is worth no more than its foot. Nearer by there may be one that need not yield.
+    candidate = OffCenterIn(cell, segments, found, is_at_segment, workspace);
+    place = yield_place();
+  }
   if (place.IsOnSegment()) {  // the point yields to its foot
     const double rest_sq = std::max(0.0, candidate.empty_radius_sq - distance_sq);
-    const bool is_small = domain().HasSmallAngle(HalfEdgeOf(place.segment, false)) ||
-                          domain().HasSmallAngle(HalfEdgeOf(place.segment, true));
+    const bool is_small = has_small_angle(place.segment);
     if (is_small && rho_sq < kSafeRhoSq && !found.is_too_large && rest_sq < found.bound_sq / rho_sq) {
       answer.refused_node = view.Name();
       return answer;

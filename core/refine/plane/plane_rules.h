@@ -114,6 +114,9 @@ class PlaneRules {
   SteinerPoint<2> CandidateIn(size_t sector, VertexId v, const Polytope<2>& cell, std::span<const uint32_t> segments,
                               const Assessment& found, bool is_at_segment, double edge_limit_sq,
                               StepRules<2>::CellOf cell_of, Workspace<2>& workspace) const;
+  SteinerPoint<2> OffCenterIn(const Polytope<2>& cell, std::span<const uint32_t> segments, const Assessment& found,
+                              bool is_at_segment, Workspace<2>& workspace) const;
+  void AddSegmentsNear(const SteinerPoint<2>& point, std::span<const uint32_t> segments, Workspace<2>& workspace) const;
   // Whether the way from `v` to `p` begins in a sector.
   bool LeadsInto(VertexId v, size_t sector, const Point<2>& p) const {
     return domain().SectorToward(v, Difference<2>(p, structure().point(v))) == sector;
