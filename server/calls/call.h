@@ -6,12 +6,14 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <string>
 #include <utility>
 
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
 #include "grpcpp/server_context.h"
 #include "server/calls/call_environment.h"
+#include "server/calls/routing_metadata.h"
 #include "server/log/log_fields.h"
 #include "server/security/authenticator.h"
 #include "server/wire/errors.h"
@@ -179,6 +181,9 @@ void Call<Reactor>::FinishNow() {
   LogFields figures = Figures();
   if (const std::string cause(final_status_.message()); WithoutFolders(cause) != cause) {
     figures.Add("cause", cause);
+  }
+  if (const std::string owner = OwnerAddressOf(final_status_); !owner.empty()) {
+    context_->AddTrailingMetadata(kOwnerMetadata, owner);
   }
   environment_.observability.calls().Note(context_, figures);
   this->Finish(ToGrpcStatus(final_status_));

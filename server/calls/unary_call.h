@@ -11,6 +11,8 @@
 #include "grpcpp/support/server_callback.h"
 #include "server/calls/call.h"
 #include "server/calls/request_ids.h"
+#include "server/calls/routing_metadata.h"
+#include "wellspace/v1/sessions.pb.h"
 
 namespace wellspace::server {
 
@@ -99,6 +101,10 @@ class UnaryCall final : public Call<grpc::ServerUnaryReactor> {
     }
     if (answer.status.ok()) {
       response.ParseFromString(answer.response);
+      if (const auto* made = dynamic_cast<const v1::CreateSessionResponse*>(&response)) {
+        const std::string& name = made->session().name();
+        context()->AddInitialMetadata(kSessionMetadata, name.substr(name.find('/') + 1));
+      }
     }
     End(answer.status);
   }

@@ -169,8 +169,8 @@ google::rpc::Status DetailsOf(const absl::Status& status, const std::string& rea
   google::rpc::ErrorInfo info;
   info.set_reason(reason);
   info.set_domain(kErrorDomain);
-  if (const absl::optional<absl::Cord> address = status.GetPayload(kAddress); address.has_value()) {
-    (*info.mutable_metadata())["address"] = std::string(*address);
+  if (const std::string address = OwnerAddressOf(status); !address.empty()) {
+    (*info.mutable_metadata())["address"] = address;
   }
   details.add_details()->PackFrom(info);
   if (const absl::optional<absl::Cord> field = status.GetPayload(kField); field.has_value()) {
@@ -220,6 +220,11 @@ absl::Status SessionElsewhereError(std::string_view message, std::string_view ad
     status.SetPayload(kAddress, absl::Cord(ToAbsl(address)));
   }
   return status;
+}
+
+std::string OwnerAddressOf(const absl::Status& status) {
+  const absl::optional<absl::Cord> address = status.GetPayload(kAddress);
+  return address.has_value() ? std::string(*address) : std::string();
 }
 
 grpc::Status ToGrpcStatus(const absl::Status& status) {

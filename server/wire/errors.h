@@ -31,6 +31,8 @@ absl::Status MemoryLimitError(std::string_view message, bool may_retry);
 bool IsMemoryLimit(const absl::Status& status);
 // A SESSION_ELSEWHERE. `address`: where the server is that has the session; empty: unknown.
 absl::Status SessionElsewhereError(std::string_view message, std::string_view address);
+// The address of such a status; empty: it has none.
+std::string OwnerAddressOf(const absl::Status& status);
 
 // The status of a call that ended with `status`: with ErrorInfo, BadRequest where there is a field, and RetryInfo where
 // the call may be repeated. To be called where a status leaves the server, nowhere else.

@@ -59,6 +59,15 @@ bool Recorder::Try(const std::function<grpc::Status(grpc::ClientContext&)>& call
   return false;
 }
 
+void Recorder::RouteBy(const google::protobuf::Message& request, grpc::ClientContext& context) {
+  constexpr size_t kIdSize = 32;
+  const std::string text = request.ShortDebugString();
+  const std::string prefix = "\"sessions/";
+  if (const size_t at = text.find(prefix); at != std::string::npos) {
+    context.AddMetadata("wellspace-session", text.substr(at + prefix.size(), kIdSize));
+  }
+}
+
 void Recorder::Turn(const grpc::Status& status) {
   const std::string named = DetailsOf(status).address;
   const auto found = std::ranges::find(servers_, named, &Server::address);
@@ -87,6 +96,7 @@ void Recorder::CheckAll() {
     request.set_name(name);
     v1::GetSessionResponse response;
     const auto get = [&](grpc::ClientContext& context) {
+      RouteBy(request, context);
       return server().sessions->GetSession(&context, request, &response);
     };
     EXPECT_TRUE(Try(get, grpc::StatusCode::NOT_FOUND)) << name;
@@ -115,6 +125,7 @@ uint32_t Recorder::Checksum(const std::string& name, uint64_t revision) {
     request.set_name(name);
     request.set_revision(revision);
     checksum = 0;
+    RouteBy(request, context);
     const auto stream = server().sessions->DownloadMesh(&context, request);
     for (v1::DownloadMeshResponse response; stream->Read(&response);) {
       const std::string bytes = response.SerializeAsString();

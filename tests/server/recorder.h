@@ -55,6 +55,8 @@ class Recorder {
   // than a server's death is a failure.
   bool Try(const std::function<grpc::Status(grpc::ClientContext&)>& call,
            grpc::StatusCode expected = grpc::StatusCode::OK);
+  // Tells a proxy the session that a request is about.
+  static void RouteBy(const google::protobuf::Message& request, grpc::ClientContext& context);
   // Asks another server from now on: the one that `status` names, if any.
   void Turn(const grpc::Status& status);
 
@@ -65,6 +67,7 @@ class Recorder {
     Response response;
     const bool has_come = Try([&](grpc::ClientContext& context) {
       response.Clear();
+      RouteBy(request, context);
       return ((*(server().*stub)).*method)(&context, request, &response);
     });
     return has_come ? std::optional<Response>(response) : std::nullopt;

@@ -4,9 +4,7 @@
 #include <array>
 #include <atomic>
 #include <chrono>
-#include <fstream>
 #include <functional>
-#include <iterator>
 #include <memory>
 #include <optional>
 #include <random>
@@ -26,9 +24,9 @@
 #include "gtest/gtest.h"
 #include "tests/server/daemon.h"
 #include "tests/server/recorder.h"
+#include "tests/server/replicas_fixture.h"
 #include "tests/server/session_calls.h"
 #include "tests/server/store/postgres_server.h"
-#include "tests/server/store/store_support.h"
 #include "tests/server/subprocess.h"
 #include "tests/support/amount.h"
 
@@ -43,108 +41,42 @@ using ::testing::SizeIs;
 // Faults among clients that go on; the long test has more.
 const int kFaults = test::Amount("WELLSPACE_FAULTS", 6);
 constexpr int kClients = 3;
-constexpr absl::Duration kLease = absl::Seconds(2);
 
-std::string TextOfFile(const std::string& path) {
-  std::ifstream file(path);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+// That every kind of call works on a session that was made by another server, whose mesh was `mesh`.
+void UseSession(Daemon& daemon, const std::string& name, const std::string& mesh, int operations = 1) {
+  SessionCalls calls = CallsOf(daemon);
+  EXPECT_EQ(calls.MeshBytes(name), mesh);
+  EXPECT_THAT(calls.List({}).sessions(), SizeIs(1));
+  EXPECT_THAT(calls
+                  .ListOperations([&] {
+                    v1::ListOperationsRequest request;
+                    request.set_parent(name);
+                    return request;
+                  }())
+                  .operations(),
+              SizeIs(operations));
+  grpc::ClientContext context;
+  v1::AddVerticesRequest add;
+  add.set_name(name);
+  add.mutable_points()->Add(0.501);
+  add.mutable_points()->Add(0.499);
+  v1::AddVerticesResponse added;
+  EXPECT_TRUE(calls.queries().AddVertices(&context, add, &added).ok());
+  const uint64_t points = calls.Get(name).committed_points();
+  calls.Upload(name, points, UniformPoints(50, 2, 2));
+  EXPECT_EQ(calls.Refine(name).state(), v1::Operation::STATE_SUCCEEDED);
+  v1::UpdateSessionRequest update;
+  update.mutable_session()->set_name(name);
+  update.mutable_update_mask()->add_paths("labels");
+  (*update.mutable_session()->mutable_labels())["a"] = "b";
+  EXPECT_EQ(calls.Update(update).labels().at("a"), "b");
+  v1::RemovePointsRequest remove;
+  remove.set_name(name);
+  remove.add_points(0);
+  EXPECT_EQ(calls.RemovePoints(remove).committed_points(), points + 49);
+  EXPECT_EQ(calls.Refine(name).state(), v1::Operation::STATE_SUCCEEDED);
+  calls.Delete(name);
 }
-
-class ReplicasTest : public ::testing::Test {
- protected:
-  void SetUp() override {
-    if (const std::string why = PostgresServer::WhyNot(); !why.empty()) {
-      GTEST_SKIP() << why;
-    }
-    store_ = PostgresServer::OfThisProgram().NewDatabase();
-  }
-
-  std::vector<std::string> Options(const std::string& name) const {
-    return {"--data",
-            folder_.path(),
-            "--store",
-            store_,
-            "--replica",
-            name,
-            "--lease",
-            absl::StrCat(absl::ToDoubleSeconds(kLease)),
-            "--log-level",
-            "info",
-            "--workers",
-            "1",
-            "--max-sessions-per-tenant",
-            "1000000",
-            "--max-sessions",
-            "1000000"};
-  }
-  std::string ErrorPath(const std::string& name) const { return absl::StrCat(errors_.path(), "/", name); }
-  std::unique_ptr<Daemon> Start(const std::string& name) const {
-    return std::make_unique<Daemon>(Options(name), ErrorPath(name));
-  }
-  static SessionCalls CallsOf(Daemon& daemon) {
-    return SessionCalls(grpc::CreateChannel(daemon.address(), grpc::InsecureChannelCredentials()));
-  }
-  // Until `daemon` has the session, or a minute is over.
-  static v1::Session AwaitSession(Daemon& daemon, const std::string& name) {
-    SessionCalls calls = CallsOf(daemon);
-    const absl::Time deadline = absl::Now() + absl::Minutes(1);
-    grpc::Status status;
-    v1::Session session;
-    do {
-      session = calls.Get(name, &status);
-      std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    } while (!status.ok() && absl::Now() < deadline);
-    EXPECT_TRUE(status.ok()) << status.error_message();
-    return session;
-  }
-  // Makes a session that is refined.
-  static std::string MakeSession(Daemon& daemon) {
-    SessionCalls calls = CallsOf(daemon);
-    const std::string name = calls.Create(2).name();
-    calls.Upload(name, 0, UniformPoints(300, 2, 1));
-    EXPECT_EQ(calls.Refine(name).state(), v1::Operation::STATE_SUCCEEDED);
-    return name;
-  }
-  // That every kind of call works on a session that was made by another server, whose mesh was `mesh`.
-  static void UseSession(Daemon& daemon, const std::string& name, const std::string& mesh, int operations = 1) {
-    SessionCalls calls = CallsOf(daemon);
-    EXPECT_EQ(calls.MeshBytes(name), mesh);
-    EXPECT_THAT(calls.List({}).sessions(), SizeIs(1));
-    EXPECT_THAT(calls
-                    .ListOperations([&] {
-                      v1::ListOperationsRequest request;
-                      request.set_parent(name);
-                      return request;
-                    }())
-                    .operations(),
-                SizeIs(operations));
-    grpc::ClientContext context;
-    v1::AddVerticesRequest add;
-    add.set_name(name);
-    add.mutable_points()->Add(0.501);
-    add.mutable_points()->Add(0.499);
-    v1::AddVerticesResponse added;
-    EXPECT_TRUE(calls.queries().AddVertices(&context, add, &added).ok());
-    const uint64_t points = calls.Get(name).committed_points();
-    calls.Upload(name, points, UniformPoints(50, 2, 2));
-    EXPECT_EQ(calls.Refine(name).state(), v1::Operation::STATE_SUCCEEDED);
-    v1::UpdateSessionRequest update;
-    update.mutable_session()->set_name(name);
-    update.mutable_update_mask()->add_paths("labels");
-    (*update.mutable_session()->mutable_labels())["a"] = "b";
-    EXPECT_EQ(calls.Update(update).labels().at("a"), "b");
-    v1::RemovePointsRequest remove;
-    remove.set_name(name);
-    remove.add_points(0);
-    EXPECT_EQ(calls.RemovePoints(remove).committed_points(), points + 49);
-    EXPECT_EQ(calls.Refine(name).state(), v1::Operation::STATE_SUCCEEDED);
-    calls.Delete(name);
-  }
-
-  const TestFolder folder_;
-  const TestFolder errors_;
-  std::string store_;
-};
 
 TEST_F(ReplicasTest, ASessionIsFoundWhereItIs) {
   const auto first = Start("first");

@@ -21,7 +21,7 @@ Subprocess::Subprocess(const std::string& name, std::vector<std::string> argumen
   if (folder == nullptr) {
     throw std::runtime_error("WELLSPACE_BIN_DIR is not set: run this test with ctest");
   }
-  arguments.insert(arguments.begin(), std::string(folder) + "/" + name);
+  arguments.insert(arguments.begin(), name[0] == '/' ? name : std::string(folder) + "/" + name);
   if (!limits.empty()) {
     arguments.insert(arguments.begin(), {"/bin/sh", "-c", limits + R"(; exec "$0" "$@")"});
   }
