@@ -146,6 +146,9 @@ class CloudMaker {
       figures_.solids += role.is_meshed ? 1 : 0;
       role.region = !has_regions && role.is_meshed ? static_cast<int32_t>(figures_.solids) : role.region;
     }
+    for (SolidRole& role : roles) {
+      role.region = !has_regions && figures_.solids == 1 ? 0 : role.region;
+    }
     if (figures_.solids == 0) {
       return absl::InvalidArgumentError("triangles: no solid is meshed: each has a hole; expected a solid without one");
     }

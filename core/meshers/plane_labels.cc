@@ -120,7 +120,7 @@ absl::Status SetRegions(const PlanarDomain& planar, std::span<const uint32_t> fa
     regions[id] = value;
   }
   for (const auto& [id, value] : regions) {
-    mesh.regions.push_back({id, value == 0 ? "domain" : absl::StrCat("region_", value)});
+    mesh.regions.push_back({id, RegionName(value)});
   }
   if (regions.size() > 1) {
     mesh.simplex_regions.reserve(mesh.simplex_count());

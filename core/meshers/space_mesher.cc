@@ -481,12 +481,12 @@ absl::Status SpaceMesher::Describe(Mesh& mesh, std::span<const uint32_t> faces, 
   std::map<int32_t, size_t> places;  // of regions in the mesh
   for (uint32_t solid = 0; solid < regions.size(); ++solid) {
     if (regions[solid] > 0) {
-      places.emplace(regions[solid], 0);
+      places.emplace(regions[solid], solid);
     }
   }
   for (auto& [id, place] : places) {
-    place = mesh.regions.size();
-    mesh.regions.push_back({id, places.size() == 1 ? "domain" : absl::StrCat("region_", id)});
+    mesh.regions.push_back({id, RegionName(spatial_->roles()[place].region)});
+    place = mesh.regions.size() - 1;
   }
   SurfaceStatistics& surface = mesh.statistics.surface.emplace();
   WELLSPACE_RETURN_IF_ERROR(DescribeSimplices(mesh, faces, regions, places, context));

@@ -37,6 +37,9 @@ inline std::map<int64_t, int32_t> NumberAboveZero(const std::set<int64_t>& value
 // The name of the part with a marker: "marker_7", and "unmarked" for 0.
 inline std::string MarkerName(int64_t marker) { return marker == 0 ? "unmarked" : absl::StrCat("marker_", marker); }
 
+// The name of the region of a seed, or of a face or solid without one: "region_7", and "domain" for 0.
+inline std::string RegionName(int64_t region) { return region == 0 ? "domain" : absl::StrCat("region_", region); }
+
 }  // namespace wellspace::core
 
 #endif  // WELLSPACE_CORE_SIMPLEX_PART_NUMBERS_H_

@@ -18,6 +18,7 @@
 #include "core/features/union_find.h"
 #include "core/geometry/triangle.h"
 #include "core/geometry/vector_product.h"
+#include "core/simplex/part_numbers.h"
 #include "core/validate/deviation.h"
 #include "core/validate/facet_edges.h"
 #include "core/validate/membership.h"
@@ -190,7 +191,7 @@ class Comparison {
       }
       const int32_t region = parts_.domain.regions[found_[0]];
       const auto name = parts_.domain.region_names.find(region);
-      const std::string wanted = absl::StrCat("region_", seed.region);
+      const std::string wanted = RegionName(seed.region);
       if (region != seed.region && (name == parts_.domain.region_names.end() || name->second != wanted)) {
         Fault(absl::StrCat("tetrahedron ", found_[0], " has the region ", region, ", but the point ", TextOf(seed.at),
                            " in it is of region ", seed.region));
