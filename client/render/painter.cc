@@ -26,6 +26,21 @@ constexpr int kSupersampling = 2;
 // Grey where there is no value.
 Colour ValueColour(float share) { return std::isnan(share) ? Colour{0.78, 0.78, 0.78} : RampColour(share); }
 
+// Draws the dots of a facet. Each facet at a vertex does so, and the last of them paints over the others: what lies
+// before the vertex hides its dot.
+void PaintDots(cairo_t* cairo, const Facet& facet, const Layout& layout) {
+  constexpr double kRadius = 2.6;
+  constexpr double kFullTurn = 6.283185307179586;
+  for (int i = 0; i < 3; ++i) {
+    if (facet.has_dot[i]) {
+      cairo_new_sub_path(cairo);
+      cairo_arc(cairo, layout.X(facet.corners[i]), layout.Y(facet.corners[i]), kRadius, 0, kFullTurn);
+    }
+  }
+  SetColour(cairo, {0.08, 0.08, 0.10});
+  cairo_fill(cairo);
+}
+
 // Fills the triangles and draws their edges, which fade as the triangles get too small to show them.
 void PaintFacets(cairo_t* cairo, const Scene& scene, const Layout& layout, bool stroke_small) {
   constexpr double kInvisible = 1.2;  // pixels that a triangle is high
@@ -56,14 +71,15 @@ void PaintFacets(cairo_t* cairo, const Scene& scene, const Layout& layout, bool 
     const bool edges_show = longest > kClear && height > kInvisible;
     if (!edges_show && !stroke_small) {
       cairo_fill(cairo);
-      continue;
+    } else {
+      cairo_fill_preserve(cairo);
+      if (edges_show) {
+        const double strength = std::clamp((height - kInvisible) / (kClear - kInvisible), 0.0, 1.0);
+        SetColour(cairo, Shaded(colour, 0.35), 0.15 + 0.55 * strength);
+      }
+      cairo_stroke(cairo);
     }
-    cairo_fill_preserve(cairo);
-    if (edges_show) {
-      const double strength = std::clamp((height - kInvisible) / (kClear - kInvisible), 0.0, 1.0);
-      SetColour(cairo, Shaded(colour, 0.35), 0.15 + 0.55 * strength);
-    }
-    cairo_stroke(cairo);
+    PaintDots(cairo, facet, layout);
   }
 }
 

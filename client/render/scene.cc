@@ -208,8 +208,14 @@ Scene SceneOf(const FieldValues* field, double best_angle_deg, const char* angle
              : Scene{.low = field->low(), .high = field->high(), .is_angle = false, .legend = field->name()};
 }
 
-absl::StatusOr<Scene> MakePlaneScene(const formats::MeshView& mesh, const Categories& categories,
-                                     const FieldValues* field) {
+// Which of the three vertices have dots.
+std::array<bool, 3> DotsAt(const std::vector<bool>& dots, std::span<const uint32_t> vertices) {
+  return dots.empty() ? std::array<bool, 3>{}
+                      : std::array<bool, 3>{dots[vertices[0]], dots[vertices[1]], dots[vertices[2]]};
+}
+
+absl::StatusOr<Scene> MakePlaneScene(const formats::MeshView& mesh, const std::vector<bool>& dots,
+                                     const Categories& categories, const FieldValues* field) {
   Extent extent;
   for (const uint32_t vertex : mesh.simplices) {
     extent.Add(PointOf<2>(mesh, vertex));
@@ -220,10 +226,11 @@ absl::StatusOr<Scene> MakePlaneScene(const formats::MeshView& mesh, const Catego
   scene.facets.reserve(mesh.simplex_count());
   for (uint64_t simplex = 0; simplex < mesh.simplex_count(); ++simplex) {
     const Simplex<2> corners = SimplexOf<2>(mesh, simplex);
-    const double share = field == nullptr ? core::Angles<2>(corners).min_deg / kBestAngle
-                                          : field->ShareAt(mesh.simplices.subspan(3 * simplex, 3));
+    const std::span<const uint32_t> vertices = mesh.simplices.subspan(3 * simplex, 3);
+    const double share = field == nullptr ? core::Angles<2>(corners).min_deg / kBestAngle : field->ShareAt(vertices);
     scene.facets.push_back(MakeFacet({corners[0], corners[1], corners[2]}, extent, share, 1));
     scene.facets.back().category = categories.OfSimplex(simplex);
+    scene.facets.back().has_dot = DotsAt(dots, vertices);
   }
   for (size_t i = 0; i + 1 < mesh.facets.size(); i += 2) {
     scene.boundary.push_back(
@@ -374,6 +381,7 @@ struct VisibleFacet {
   double share;
   double shade;
   uint32_t category = 0;
+  std::array<bool, 3> has_dot{};
 };
 
 // None when the facet looks away.
@@ -425,6 +433,7 @@ absl::StatusOr<Scene> MakeCutScene(const formats::MeshView& mesh, const View& vi
       const auto corner_at = [&](uint32_t i) { return mesh.simplices[4 * simplex + (exposed.corner + i) % 4]; };
       const std::array<uint32_t, 3> corners = {corner_at(1), corner_at(2), corner_at(3)};
       facet->category = categories.OfFacet(simplex, corners);
+      facet->has_dot = DotsAt(view.dots, corners);
       if (field != nullptr) {
         facet->share = field->ShareAt(corners);
       }
@@ -442,6 +451,7 @@ absl::StatusOr<Scene> MakeCutScene(const formats::MeshView& mesh, const View& vi
   for (const VisibleFacet& facet : visible) {
     scene.facets.push_back(MakeFacet(facet.corners, extent, facet.share, facet.shade));
     scene.facets.back().category = facet.category;
+    scene.facets.back().has_dot = facet.has_dot;
   }
   return scene;
 }
@@ -471,6 +481,10 @@ absl::StatusOr<Scene> MakeScene(const formats::MeshView& mesh, const View& view)
   if (view.only_boundary && view.plane.has_value()) {
     return absl::InvalidArgumentError("a plane cuts the mesh, of which the boundary alone was asked for");
   }
+  if (!view.dots.empty() && view.dots.size() != mesh.vertex_count()) {
+    return absl::InvalidArgumentError(absl::StrCat("expected to be told of ", mesh.vertex_count(),
+                                                   " vertices whether they have a dot, got ", view.dots.size()));
+  }
   const Colouring colouring =
       view.colouring.value_or(view.only_boundary && mesh.boundary.size() > 1 ? Colouring::kBoundary
                               : mesh.regions.size() > 1                      ? Colouring::kRegion
@@ -497,7 +511,7 @@ absl::StatusOr<Scene> MakeScene(const formats::MeshView& mesh, const View& view)
     }
   }
   const FieldValues* const values = field.has_value() ? &*field : nullptr;
-  WELLSPACE_ASSIGN_OR_RETURN(Scene scene, mesh.dimension == 2 ? MakePlaneScene(mesh, categories, values)
+  WELLSPACE_ASSIGN_OR_RETURN(Scene scene, mesh.dimension == 2 ? MakePlaneScene(mesh, view.dots, categories, values)
                                                               : MakeCutScene(mesh, view, categories, values));
   scene.categories = categories.Names();
   if (colouring == Colouring::kBoundary) {

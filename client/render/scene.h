@@ -17,9 +17,10 @@ using PicturePoint = std::array<float, 2>;  // relative to the scene's low corne
 
 struct Facet {
   std::array<PicturePoint, 3> corners;
-  float share;            // of the way from Scene::low to high, of its value; NaN: it has none
-  float shade;            // brightness by its direction, about 1
-  uint32_t category = 0;  // an index into Scene::categories
+  float share;                    // of the way from Scene::low to high, of its value; NaN: it has none
+  float shade;                    // brightness by its direction, about 1
+  uint32_t category = 0;          // an index into Scene::categories
+  std::array<bool, 3> has_dot{};  // by corner
 };
 
 struct Scene {
@@ -52,6 +53,7 @@ struct View {
   std::optional<Colouring> colouring{};
   // Of kField: a number for each vertex of the mesh, NaN where there is none. A facet has the mean of its corners.
   const formats::PointAttribute* field = nullptr;
+  std::vector<bool> dots{};  // by vertex: whether it has a dot; empty: none has
 };
 
 // The triangles of a 2-D mesh with its boundary; of a 3-D mesh, the visible facets of the tetrahedra whose centroid the
@@ -65,7 +67,7 @@ struct View {
 // Errors:     INVALID_ARGUMENT for a mesh of more than three dimensions, one with nothing to draw, a plane, a camera or
 //             the boundary alone of a 2-D mesh, a plane beside the boundary alone, a normal or a camera of no
 //             direction, coordinates whose extent is beyond the range of double, or colours by region, of the
-//             boundary of a 3-D mesh, or by a field, where the mesh tells of none.
+//             boundary of a 3-D mesh, or by a field, where the mesh tells of none; dots for another number of vertices.
 // Source:     Edelsbrunner, "An acyclicity theorem for cell complexes in d dimensions", 1990; Max, Hanrahan, Crawfis,
 //             "Area and volume coherence for efficient visualization of 3D scalar functions", 1990.
 absl::StatusOr<Scene> MakeScene(const formats::MeshView& mesh, const View& view);

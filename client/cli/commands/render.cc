@@ -1,4 +1,6 @@
 // wellspace render: a picture of a mesh.
+#include <algorithm>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -31,16 +33,18 @@ struct RenderCommand {
   std::string up = "z";
   std::string colour = "auto";
   std::string field;
+  bool draws_points = false;
   OutputFormat format = OutputFormat::kText;
 
   absl::Status Render() const;
   absl::StatusOr<formats::MeshOrCloud> Read() const;
   absl::StatusOr<const formats::PointAttribute*> FieldOf(const formats::MeshOrCloud& read) const;
+  absl::StatusOr<std::vector<bool>> DotsOf(const formats::MeshOrCloud& read) const;
 };
 
 // The mesh, with the data of its vertices if a field is asked for.
 absl::StatusOr<formats::MeshOrCloud> RenderCommand::Read() const {
-  if (!field.empty() && mesh_path != formats::kStandardStream) {
+  if ((!field.empty() || draws_points) && mesh_path != formats::kStandardStream) {
     absl::StatusOr<formats::MeshOrCloud> with_data = formats::ReadMeshOrCloud(mesh_path, {.keep_attributes = true});
     if (with_data.ok() && with_data->is_mesh) {
       return with_data;
@@ -66,6 +70,21 @@ absl::StatusOr<const formats::PointAttribute*> RenderCommand::FieldOf(const form
                                                      : absl::StrCat("expected one of ", absl::StrJoin(names, ", "))));
 }
 
+// Which vertices are input points.
+absl::StatusOr<std::vector<bool>> RenderCommand::DotsOf(const formats::MeshOrCloud& read) const {
+  const std::vector<uint32_t>& origins = read.mesh.vertex_origins;
+  std::vector<bool> dots(read.mesh.View().vertex_count());
+  for (size_t v = 0; v < dots.size(); ++v) {
+    dots[v] = origins.size() == dots.size() ? origins[v] < formats::kMiddleOrigin : v < read.input_vertices;
+  }
+  if (std::find(dots.begin(), dots.end(), true) == dots.end()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("--points: ", mesh_path,
+                     " does not tell which vertices are input points; expected a .vtu, .vtk or .npz of wellspace"));
+  }
+  return dots;
+}
+
 absl::Status RenderCommand::Render() const {
   if (!plane.empty() && plane.size() != 4) {
     return absl::InvalidArgumentError(absl::StrCat("--plane: expected 4 numbers nx,ny,nz,d, got ", plane.size()));
@@ -83,6 +102,9 @@ absl::Status RenderCommand::Render() const {
   if (!field.empty()) {
     WELLSPACE_ASSIGN_OR_RETURN(view.field, FieldOf(read));
     view.colouring = render::Colouring::kField;
+  }
+  if (draws_points) {
+    WELLSPACE_ASSIGN_OR_RETURN(view.dots, DotsOf(read));
   }
   view.up = up[0] - 'x';
   view.only_boundary = !only.empty();
@@ -147,6 +169,8 @@ void AddRenderCommand(CLI::App& app, int& exit_code) {
           "is NAME:0, NAME:1, ...")
       ->type_name("NAME")
       ->excludes("--colour");
+  render->add_flag("--points", command->draws_points,
+                   "Draw a dot at each vertex that is an input point, as the mesh's file tells");
   AddOutput(*render, command->format);
   render->callback([command, &exit_code] {
     const Interrupt interrupt(Interrupt::First::kEnd);
