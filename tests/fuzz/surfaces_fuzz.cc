@@ -5,7 +5,8 @@
 // .node file beside it that file first, after a length of two bytes, low one first. After 'x' comes a complex: a byte
 // each for the solids, the weld and the number of points; a byte for each coordinate; then three bytes for the corners
 // of each triangle and one for its marker. After 'w' comes one whose solids are by winding: with a byte for the
-// resolution, and none for the solids.
+// resolution, and none for the solids. After 'k' comes one of which the points are kept, and which is meshed.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -15,6 +16,7 @@
 
 #include "client/formats/surface/read_surface.h"
 #include "core/input/surface_report.h"
+#include "core/meshers/mesher.h"
 #include "tests/fuzz/fuzz.h"
 #include "tests/fuzz/scratch_folder.h"
 
@@ -118,9 +120,38 @@ void Inspect(const std::vector<double>& points, const core::SurfaceFeatures& fea
   RequireSameBackwards(points, features, *report);
 }
 
-void TryComplex(ByteReader& bytes, bool winds) {
+// Of a mesh that keeps points: all corners of triangles at meshed solids are vertices, with their bits; and its boundary
+// is closed.
+void MeshKeeping(const std::vector<double>& points, core::SurfaceFeatures features) {
+  constexpr uint64_t kMostVertices = 3000;
+  features.keeps_points = true;
+  core::MeshParameters parameters;
+  parameters.dimension = 3;
+  parameters.max_vertices = kMostVertices;
+  core::RunContext context;
+  const absl::StatusOr<core::Mesh> mesh = core::MeshPoints(parameters, core::Input(points, features), context);
+  if (!mesh.ok()) {
+    Require(absl::IsInvalidArgument(mesh.status()) || absl::IsResourceExhausted(mesh.status()),
+            "what cannot be meshed is refused:", mesh.status().ToString());
+    return;
+  }
+  Require(mesh->input_vertex.size() == points.size() / 3, "each point has its vertex, or none");
+  for (size_t i = 0; i < mesh->input_vertex.size(); ++i) {
+    const uint32_t v = mesh->input_vertex[i];
+    Require(v == core::kNoOutput || std::equal(&points[3 * i], &points[3 * i] + 3, &mesh->points[3 * size_t{v}]),
+            "a point that is a vertex keeps its place");
+  }
+  const auto report = core::InspectSurface(points, features, 1, core::RunContext());
+  const bool are_all_at_solids = report.ok() && features.solids == core::SolidRule::kHoles && report->membranes == 0 &&
+                                 report->flat_triangles == 0;
+  for (const uint32_t corner : features.corners) {
+    Require(!are_all_at_solids || mesh->input_vertex[corner] != core::kNoOutput, "corners of triangles are kept");
+  }
+}
+
+void TryComplex(ByteReader& bytes, uint8_t kind) {
   core::SurfaceFeatures features;
-  if (winds) {
+  if (kind == 'w') {
     features.solids = core::SolidRule::kWinding;
     features.resolution = 0.25 * (1 + bytes.Next() % 5);
   } else {
@@ -142,7 +173,11 @@ void TryComplex(ByteReader& bytes, bool winds) {
   }
   features.corners = corners;
   features.markers = markers;
-  Inspect(points, features);
+  if (kind == 'k') {
+    MeshKeeping(points, features);
+  } else {
+    Inspect(points, features);
+  }
 }
 
 }  // namespace
@@ -152,8 +187,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace wellspace;
   fuzz::ByteReader bytes(data, size);
   const uint8_t choice = bytes.Next();
-  if (choice == 'x' || choice == 'w') {
-    fuzz::TryComplex(bytes, choice == 'w');
+  if (choice == 'x' || choice == 'w' || choice == 'k') {
+    fuzz::TryComplex(bytes, choice);
     return 0;
   }
   const size_t format = static_cast<uint8_t>(choice - '0') % fuzz::kFormats.size();
