@@ -97,7 +97,7 @@ TEST_F(VtkGridsTest, LegacyGrids) {
               HasSubstr("three numbers after SPACING"));
   EXPECT_THAT(ReadBad("a.vtk", Changed(image, "DIMENSIONS 2 1 2", "DIMENSIONS 9999 9999 2")),
               HasSubstr("expected DIMENSIONS of at most "));
-  EXPECT_THAT(ReadBad("a.vtk", Changed(image, "DIMENSIONS 2 1 2", "DIMENSIONS 0 1 2")), HasSubstr("POINT_DATA")) << "";
+  EXPECT_EQ(ReadGood("a.vtk", Changed(image, "DIMENSIONS 2 1 2", "DIMENSIONS 0 1 2")).size(), 0);
 }
 
 TEST_F(VtkGridsTest, PiecesLieBesideTheirFile) {
