@@ -10,6 +10,7 @@
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
 #include "core/meshers/space_mesher.h"
+#include "core/simplex/flat_tetrahedra.h"
 #include "core/simplex/solid_labels.h"
 
 namespace wellspace::core {
@@ -50,6 +51,9 @@ absl::Status SpaceMesher::MakeTetrahedra(int threads, RunContext& context) {
   WELLSPACE_ASSIGN_OR_RETURN(const bool has_changed, MatchPlaces(simplices, solids, context));
   if (has_changed) {
     WELLSPACE_ASSIGN_OR_RETURN(points, ScaledPoints(context));
+  }
+  if (!spatial_->creases().IsEmpty()) {  // around which vertices mirror each other, and do not move
+    WELLSPACE_RETURN_IF_ERROR(FlipFlatTetrahedra(points, simplices.indices, solids, context).status());
   }
   const std::vector<int32_t> regions = Regions();
   WELLSPACE_ASSIGN_OR_RETURN(SolidBoundary boundary, FindSolidBoundary({points, simplices.indices, solids, regions},

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -22,14 +23,14 @@
 namespace wellspace::core {
 
 // No vertex of the mesh lies strictly inside the circumsphere of a simplex, by exact signs. `simplex` and `sphere` are
-// the words for these: "triangle", "circumcircle".
+// the words for these: "triangle", "circumcircle". is_rounding(depth, radius) may let one pass that is so deep inside.
 //
 // REQUIRES:   ValidateIndices and ValidateOrientation are OK.
 // Complexity: O(m log m) for most meshes.
 // Errors:     FAILED_PRECONDITION, naming simplex and vertex; CANCELLED, DEADLINE_EXCEEDED.
 template <int D>
-absl::Status CheckEmptySpheres(const MeshView& mesh, const char* simplex, const char* sphere,
-                               const RunContext& context) {
+absl::Status CheckEmptySpheres(const MeshView& mesh, const char* simplex, const char* sphere, const RunContext& context,
+                               const std::function<bool(double depth, double radius)>& is_rounding = nullptr) {
   // The sphere that is searched is larger by so much, relatively, than the computed one.
   constexpr double kRoom = 1e-9;
   constexpr size_t kBetweenLooks = 256;
@@ -56,8 +57,9 @@ absl::Status CheckEmptySpheres(const MeshView& mesh, const char* simplex, const 
     const double radius = std::sqrt(NormSq<D>(offset));
     std::optional<uint32_t> inside;
     tree.ForEach(WithinReachOf<D>(centre, radius * (1 + kRoom)), [&](uint32_t v) {
-      if (std::find(own.begin(), own.end(), v) == own.end() &&
-          InSphere<D>(corners, PointAt<D>(mesh.points, v)).sign == Sign::kPositive) {
+      const Point<D> p = PointAt<D>(mesh.points, v);
+      if (std::find(own.begin(), own.end(), v) == own.end() && InSphere<D>(corners, p).sign == Sign::kPositive &&
+          !(is_rounding != nullptr && is_rounding(radius - Distance<D>(p, centre), radius))) {
         inside = v;
       }
       return !inside.has_value();

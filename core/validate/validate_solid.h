@@ -33,9 +33,9 @@ struct SolidMeshReport {
 // Checks the mesh alone: tetrahedra are positively oriented; a face of one belongs to another on its other side, of
 // the same region, or it is a facet; facets are faces of tetrahedra, each there once, with the tetrahedron of the lower
 // region on the inner side; ridges are edges of facets, each there once; and no vertex lies strictly inside a
-// circumsphere. So the boundary of each region is closed, and tetrahedra overlap only if all their corners are on one
-// sphere. With rho above 0 a tetrahedron may break it only if one of its vertices is on an edge at which two facets
-// make less than 75 degrees.
+// circumsphere, but by what is rounded: up to 2^-40 of the largest coordinate and 1e-10 of the radius. So the boundary
+// of each region is closed, and tetrahedra overlap only if all their corners are on one sphere. With rho above 0 a
+// tetrahedron may break it only if one of its vertices is on an edge at which two facets make less than 75 degrees.
 //
 // Shapes:     mesh: in 3-D.
 // Complexity: O(m log m) for most meshes.

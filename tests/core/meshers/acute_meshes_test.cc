@@ -110,6 +110,36 @@ TEST_F(AcuteMeshesTest, SliversInTubesAreNotCounted) {
   }
 }
 
+// Points that mirror each other are four on a circle: no tetrahedron without a volume is left between them.
+TEST_F(AcuteMeshesTest, HaveNoFlatTetrahedra) {
+  const auto least_angle = [](const TestSurface& part) {
+    const absl::StatusOr<Mesh> mesh = MeshOf(part, MeshParameters());
+    EXPECT_TRUE(mesh.ok()) << mesh.status();
+    ExpectConforming(*mesh);
+    return mesh->statistics.min_angle_deg;
+  };
+  EXPECT_GE(least_angle(Wedge(5)), 5 - 0.01);
+  for (const double degrees : {8.0, 10.0, 20.0, 30.0, 45.0, 60.0, 70.0}) {
+    EXPECT_GE(least_angle(Wedge(degrees)), std::min(12.0, degrees) - 0.01) << degrees;
+    TestSurface turned = Wedge(degrees);
+    const double c = std::cos(1 + random_.Unit());
+    const double s = std::sin(1 + random_.Unit());
+    for (size_t i = 0; i < turned.points.size(); i += 3) {  // hardly by a rotation: no face is along an axis
+      const Point<3> p = PointAt<3>(turned.points, i / 3);
+      turned.points[i] = c * p[0] - s * p[1] + 0.1 * p[2];
+      turned.points[i + 1] = s * p[0] + c * p[1];
+      turned.points[i + 2] = p[2] - 0.2 * p[1];
+    }
+    EXPECT_GE(least_angle(turned), 4) << degrees;
+  }
+  EXPECT_GE(least_angle(test::AcuteTetrahedron(10)), 5);
+  EXPECT_GE(least_angle(test::AcuteTetrahedron(40)), 5);
+  EXPECT_GE(least_angle(test::LensBar(24)), 1);
+  // Rings around the tip of a cone are on a sphere, and nearly on a plane: what is thin there has a volume.
+  EXPECT_GE(least_angle(test::Cone(64, 2)), 0.01);
+  EXPECT_GE(least_angle(test::Wing(40)), 1);
+}
+
 TEST_F(AcuteMeshesTest, AreRefusedBelowFiveDegreesWithPlaceAndAngle) {
   const absl::Status status = MeshOf(Wedge(3), Bounds(Wedge(3), 0.1, 0.2, 0.01)).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
