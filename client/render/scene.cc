@@ -456,6 +456,13 @@ absl::StatusOr<Scene> MakeCutScene(const formats::MeshView& mesh, const View& vi
   return scene;
 }
 
+absl::Status CheckDots(const formats::MeshView& mesh, const View& view) {
+  return view.dots.empty() || view.dots.size() == mesh.vertex_count()
+             ? absl::OkStatus()
+             : absl::InvalidArgumentError(absl::StrCat("expected to be told of ", mesh.vertex_count(),
+                                                       " vertices whether they have a dot, got ", view.dots.size()));
+}
+
 }  // namespace
 
 absl::StatusOr<Scene> MakeScene(const formats::MeshView& mesh, const View& view) {
@@ -481,10 +488,7 @@ absl::StatusOr<Scene> MakeScene(const formats::MeshView& mesh, const View& view)
   if (view.only_boundary && view.plane.has_value()) {
     return absl::InvalidArgumentError("a plane cuts the mesh, of which the boundary alone was asked for");
   }
-  if (!view.dots.empty() && view.dots.size() != mesh.vertex_count()) {
-    return absl::InvalidArgumentError(absl::StrCat("expected to be told of ", mesh.vertex_count(),
-                                                   " vertices whether they have a dot, got ", view.dots.size()));
-  }
+  WELLSPACE_RETURN_IF_ERROR(CheckDots(mesh, view));
   const Colouring colouring =
       view.colouring.value_or(view.only_boundary && mesh.boundary.size() > 1 ? Colouring::kBoundary
                               : mesh.regions.size() > 1                      ? Colouring::kRegion

@@ -18,8 +18,8 @@ inline constexpr double kFlatShare = 1e-6;
 
 // Removes flat tetrahedra. Two pairs of points that mirror each other are on one plane and one circle, so that rounding
 // alone decides on a diagonal between them: above the plane it may be one, below the other, and a flat tetrahedron lies
-// between. Where just three tetrahedra are around one of the two diagonals, the flat one among them, that edge goes, and
-// two tetrahedra are left. What was Delaunay is Delaunay up to the rounding of these points.
+// between. Where just three tetrahedra are around one of the two diagonals, the flat one among them, that edge goes,
+// and two tetrahedra are left. What was Delaunay is Delaunay up to the rounding of these points.
 //
 // Shapes:     points: n x 3, row-major; simplices: m x 4 indices of points, row-major, positively oriented; solids: m.
 //             Both lose a row for each flip; rows keep their order.

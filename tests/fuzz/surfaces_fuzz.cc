@@ -120,8 +120,7 @@ void Inspect(const std::vector<double>& points, const core::SurfaceFeatures& fea
   RequireSameBackwards(points, features, *report);
 }
 
-// Of a mesh that keeps points: all corners of triangles at meshed solids are vertices, with their bits; and its boundary
-// is closed.
+// Of a mesh that keeps points: all corners of triangles at meshed solids are vertices, with their bits.
 void MeshKeeping(const std::vector<double>& points, core::SurfaceFeatures features) {
   constexpr uint64_t kMostVertices = 3000;
   features.keeps_points = true;

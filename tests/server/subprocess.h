@@ -16,8 +16,9 @@ namespace wellspace::server {
 // Thread safety: thread-compatible.
 class Subprocess {
  public:
-  // Starts WELLSPACE_BIN_DIR/`name`, or `name` itself if that is an absolute path. Its standard output is read here, its standard error is the test's, or goes to the
-  // file `error_path`. `limits`: commands of a shell before it, as "ulimit -n 64", whose limits it cannot raise.
+  // Starts WELLSPACE_BIN_DIR/`name`, or `name` itself if that is an absolute path. Its standard output is read here,
+  // its standard error is the test's, or goes to the file `error_path`. `limits`: commands of a shell before it, as
+  // "ulimit -n 64", whose limits it cannot raise.
   Subprocess(const std::string& name, std::vector<std::string> arguments, const std::string& error_path = "",
              const std::string& limits = "");
   ~Subprocess();
