@@ -13,6 +13,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -113,9 +114,9 @@ absl::Status CutApart(const DualGraph& graph, const PartitionOptions& options, c
   }
   if (process == 0) {
     prctl(PR_SET_PDEATHSIG, SIGKILL);  // it does not outlive this process
-    // METIS writes its complaints there.
-    close(STDOUT_FILENO);
-    close(STDERR_FILENO);
+    // METIS writes its complaints to standard output and error. The others are connections and files of a server, which
+    // may want to close them meanwhile.
+    close_range(STDOUT_FILENO, ~0U, 0);
     _exit(CutByMetis(graph, options, part_of) == METIS_OK ? 0 : 1);
   }
   int exit_code = 0;
@@ -126,40 +127,74 @@ absl::Status CutApart(const DualGraph& graph, const PartitionOptions& options, c
                                                                     " parts; most likely it was out of memory"));
 }
 
-// Gives simplices of the largest parts to those that are empty or, if `most` is there, of those that are larger than it
-// to the smallest: the last ones in the order of their numbers.
-void EvenOut(uint32_t parts, uint64_t most, HugeVector<uint32_t>& part_of) {
+// The sizes that parts are to have, of which the largest or the smallest is found at once. There may be a million.
+class WantedSizes {
+ public:
+  explicit WantedSizes(const std::vector<uint64_t>& sizes) : sizes_(sizes) {
+    for (uint32_t part = 0; part < sizes.size(); ++part) {
+      by_size_.emplace(sizes[part], part);
+    }
+  }
+
+  uint64_t operator[](uint32_t part) const { return sizes_[part]; }
+  // Of as many parts as have that size, the one with the lowest number.
+  uint32_t Smallest() const { return by_size_.begin()->second; }
+  uint32_t Largest() const { return by_size_.lower_bound({by_size_.rbegin()->first, 0})->second; }
+  // One simplex goes from `from` to `to`.
+  void Move(uint32_t from, uint32_t to) {
+    Set(from, sizes_[from] - 1);
+    Set(to, sizes_[to] + 1);
+  }
+
+ private:
+  void Set(uint32_t part, uint64_t size) {
+    by_size_.erase({sizes_[part], part});
+    sizes_[part] = size;
+    by_size_.emplace(size, part);
+  }
+
+  std::vector<uint64_t> sizes_;
+  std::set<std::pair<uint64_t, uint32_t>> by_size_;
+};
+
+// Gives simplices of the largest parts to those that are empty and, of those that have more than `most`, to the
+// smallest: the last ones in the order of their numbers.
+//
+// Complexity: O(m), and O(log parts) for each simplex that is given.
+absl::Status EvenOut(uint32_t parts, uint64_t most, const RunContext& context, HugeVector<uint32_t>& part_of) {
   std::vector<uint64_t> sizes(parts, 0);
   for (const uint32_t part : part_of) {
     ++sizes[part];
   }
-  std::vector<uint32_t> short_of;
+  if (std::all_of(sizes.begin(), sizes.end(), [most](uint64_t size) { return size > 0 && size <= most; })) {
+    return absl::OkStatus();
+  }
+  WantedSizes wanted(sizes);
+  std::vector<uint32_t> short_of;  // of a simplex each
+  const auto give = [&](uint32_t from, uint32_t to) {
+    wanted.Move(from, to);
+    short_of.push_back(to);
+    return short_of.size() % kStepsBetweenChecks == 0 ? context.Check() : absl::OkStatus();
+  };
   for (uint32_t part = 0; part < parts; ++part) {
-    for (uint64_t missing = sizes[part] == 0 ? 1 : 0; missing > 0; --missing) {
-      short_of.push_back(part);
+    if (sizes[part] == 0) {
+      WELLSPACE_RETURN_IF_ERROR(give(wanted.Largest(), part));
     }
   }
-  std::vector<uint64_t> kept = sizes;
-  for (size_t i = 0; i < short_of.size(); ++i) {
-    --*std::max_element(kept.begin(), kept.end());
-    kept[short_of[i]] += 1;
-  }
   for (uint32_t part = 0; part < parts; ++part) {
-    while (kept[part] > most) {
-      const auto smallest = std::min_element(kept.begin(), kept.end());
-      --kept[part];
-      ++*smallest;
-      short_of.push_back(static_cast<uint32_t>(smallest - kept.begin()));
+    while (wanted[part] > most) {
+      WELLSPACE_RETURN_IF_ERROR(give(part, wanted.Smallest()));
     }
   }
   for (uint64_t s = part_of.size(); s-- > 0 && !short_of.empty();) {
     uint64_t& size = sizes[part_of[s]];
-    if (size > kept[part_of[s]]) {
+    if (size > wanted[part_of[s]]) {
       --size;
       part_of[s] = short_of.back();
       short_of.pop_back();
     }
   }
+  return absl::OkStatus();
 }
 
 }  // namespace
@@ -236,7 +271,7 @@ absl::StatusOr<HugeVector<uint32_t>> Partition(const DualGraph& graph, const Par
   const auto allowed =
       static_cast<uint64_t>((1 + kMostImbalance) * static_cast<double>(count) / static_cast<double>(options.parts));
   const uint64_t most = options.contiguous ? count : std::max(allowed, mean + 1);
-  EvenOut(options.parts, most, part_of);
+  WELLSPACE_RETURN_IF_ERROR(EvenOut(options.parts, most, context, part_of));
   return part_of;
 }
 
