@@ -277,6 +277,15 @@ absl::StatusOr<std::shared_ptr<const core::Mesh>> MeshFile::Whole(const core::Ru
   return std::shared_ptr<const core::Mesh>(std::move(mesh));
 }
 
+absl::StatusOr<uint64_t> MeshFile::WholeBytes() const {
+  WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<const Directory> whole, directory());
+  uint64_t bytes = 0;
+  for (const Array& array : whole->arrays()) {
+    bytes += array.rows() * array.row_bytes();
+  }
+  return bytes;
+}
+
 absl::StatusOr<core::HugeVector<double>> MeshFile::LoadPoints(const core::RunContext& context) const {
   WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<const Directory> whole, directory());
   WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<File> file, Open());
