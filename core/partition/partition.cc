@@ -82,13 +82,12 @@ int CutByMetis(const DualGraph& graph, const PartitionOptions& options, idx_t* p
                              nullptr, metis_options, &cut, part_of);
 }
 
-// Waits until the process has ended, or kills it when the run is cancelled. `exit_code` is its exit code, or -1 if a
-// signal ended it.
-absl::Status WaitFor(pid_t process, const RunContext& context, int& exit_code) {
+// Waits until the process has ended, or kills it when the run is cancelled. Where signals of ended processes are
+// ignored, as some parents have it, nothing is known of how it has ended.
+absl::Status WaitFor(pid_t process, const RunContext& context) {
   absl::Status status;
-  int state = 0;
   for (;;) {
-    const pid_t ended = waitpid(process, &state, status.ok() ? WNOHANG : 0);
+    const pid_t ended = waitpid(process, nullptr, status.ok() ? WNOHANG : 0);
     if (ended == process || (ended < 0 && errno != EINTR)) {
       break;
     }
@@ -101,13 +100,14 @@ absl::Status WaitFor(pid_t process, const RunContext& context, int& exit_code) {
       poll(nullptr, 0, kPollMilliseconds);
     }
   }
-  exit_code = WIFEXITED(state) ? WEXITSTATUS(state) : -1;
   return status;
 }
 
-// METIS in a process of its own, which ends with 0 if all is well.
+// METIS in a process of its own. `part_of` has a number more than there are simplices, and it is 0: the process writes
+// 1 there once all is well.
 absl::Status CutApart(const DualGraph& graph, const PartitionOptions& options, const RunContext& context,
                       idx_t* part_of) {
+  volatile idx_t& is_done = part_of[graph.simplex_count()];
   const pid_t process = fork();
   if (process < 0) {
     return absl::ResourceExhaustedError(absl::StrCat("no process for a partition: ", std::strerror(errno)));
@@ -117,14 +117,14 @@ absl::Status CutApart(const DualGraph& graph, const PartitionOptions& options, c
     // METIS writes its complaints to standard output and error. The others are connections and files of a server, which
     // may want to close them meanwhile.
     close_range(STDOUT_FILENO, ~0U, 0);
-    _exit(CutByMetis(graph, options, part_of) == METIS_OK ? 0 : 1);
+    is_done = CutByMetis(graph, options, part_of) == METIS_OK ? 1 : 0;
+    _exit(0);
   }
-  int exit_code = 0;
-  WELLSPACE_RETURN_IF_ERROR(WaitFor(process, context, exit_code));
-  return exit_code == 0 ? absl::OkStatus()
-                        : absl::ResourceExhaustedError(absl::StrCat("METIS could not cut ", graph.simplex_count(),
-                                                                    " simplices into ", options.parts,
-                                                                    " parts; most likely it was out of memory"));
+  WELLSPACE_RETURN_IF_ERROR(WaitFor(process, context));
+  return is_done == 1 ? absl::OkStatus()
+                      : absl::ResourceExhaustedError(absl::StrCat("METIS could not cut ", graph.simplex_count(),
+                                                                  " simplices into ", options.parts,
+                                                                  " parts; most likely it was out of memory"));
 }
 
 // The sizes that parts are to have, of which the largest or the smallest is found at once. There may be a million.
@@ -261,7 +261,7 @@ absl::StatusOr<HugeVector<uint32_t>> Partition(const DualGraph& graph, const Par
   if (options.parts == 1) {
     return part_of;
   }
-  const SharedParts shared(count);
+  const SharedParts shared(count + 1);
   if (!shared.is_there()) {
     return absl::ResourceExhaustedError(absl::StrCat("no memory for the parts of ", count, " simplices"));
   }
