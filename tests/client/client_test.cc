@@ -54,6 +54,10 @@ class MockConnection : public Connection {
   MOCK_METHOD(absl::Status, DownloadMesh,
               (const std::string&, MeshSink&, std::optional<uint64_t>, const OnChunks&, const CallOptions&),
               (override));
+  MOCK_METHOD(absl::Status, DownloadPart,
+              (const std::string&, const PartOptions&, MeshSink&, std::optional<uint64_t>, const OnChunks&,
+               const CallOptions&),
+              (override));
   MOCK_METHOD(absl::Status, UpdateMesh, (const std::string&, Mesh&, const OnChunks&, const CallOptions&), (override));
   MOCK_METHOD(absl::StatusOr<Operation>, StartRefinement,
               (const std::string&, const RefinementOptions&, const CallOptions&), (override));
@@ -137,6 +141,9 @@ TEST(Client, PassesSessionsAndOperationsToItsConnection) {
       .WillOnce(Return(E("vertex sizes")));
   EXPECT_CALL(*connection, DownloadMesh("s", ::testing::Ref(sink), std::optional<uint64_t>(6), _, is_call))
       .WillOnce(Return(E("download")));
+  const PartOptions part{.parts = 8, .part = 7};
+  EXPECT_CALL(*connection, DownloadPart("s", part, ::testing::Ref(sink), std::optional<uint64_t>(6), _, is_call))
+      .WillOnce(Return(E("part")));
   Mesh mesh;
   EXPECT_CALL(*connection, UpdateMesh("s", ::testing::Ref(mesh), _, is_call)).WillOnce(Return(E("update")));
   EXPECT_CALL(*connection, StartRefinement("s", Field(&RefinementOptions::restart, true), is_call))
@@ -158,6 +165,7 @@ TEST(Client, PassesSessionsAndOperationsToItsConnection) {
   EXPECT_EQ(client.SetSizes("s", samples, call).status(), E("sizes"));
   EXPECT_EQ(client.SetVertexSizes("s", vertex_sizes, call).status(), E("vertex sizes"));
   EXPECT_EQ(client.DownloadMesh("s", sink, 6, nullptr, call), E("download"));
+  EXPECT_EQ(client.DownloadPart("s", part, sink, 6, nullptr, call), E("part"));
   EXPECT_EQ(client.UpdateMesh("s", mesh, nullptr, call), E("update"));
   EXPECT_EQ(client.StartRefinement("s", {.restart = true}, call).status(), E("start"));
   EXPECT_EQ(client.GetOperation("o", call).status(), E("operation"));
