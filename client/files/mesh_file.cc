@@ -74,6 +74,9 @@ void NameParts(const std::map<int32_t, std::string>& names, std::vector<Boundary
 }
 
 absl::Status MeshFile::Begin(const MeshHeader& header) {
+  if (header.part.has_value()) {  // its numbers come last, and have their place in the middle of files
+    return absl::InvalidArgumentError("a part of a mesh is collected by a MeshCollector, and written by WritePart");
+  }
   header_ = header;
   client::NameParts(part_names_, header_.boundary);
   formats::MeshShape shape = {

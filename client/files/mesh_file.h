@@ -32,7 +32,8 @@ absl::Status WritePart(Mesh part, const std::string& path, const std::string& fo
 // Gives parts of the boundary that have tags of markers, but no names, these names.
 void NameParts(const std::map<int32_t, std::string>& names, std::vector<BoundaryPart>& boundary);
 
-// Writes a mesh to a file, in the memory of formats::MeshWriter. The file appears complete or not at all.
+// Writes a mesh to a file, in the memory of formats::MeshWriter. The file appears complete or not at all. A part of a
+// mesh is collected, and written by WritePart.
 //
 // Errors:     as of formats::CreateMesh and formats::MeshWriter.
 // Thread safety: thread-compatible.
