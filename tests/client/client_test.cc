@@ -109,6 +109,18 @@ TEST(Client, PassesMeshingToItsConnection) {
   EXPECT_EQ(client.CheckHealth("a", call).status(), E("health"));
 }
 
+TEST(Client, PassesAPartToItsConnection) {
+  auto connection = std::make_shared<MockConnection>();
+  Client client(connection);
+  const PartOptions part{.parts = 8, .part = 7};
+  MeshCollector sink;
+  const CallOptions call = {.timeout = absl::Seconds(3), .stop = {}, .request_id = ""};
+  EXPECT_CALL(*connection, DownloadPart("s", part, ::testing::Ref(sink), std::optional<uint64_t>(6), _,
+                                        Field(&CallOptions::timeout, absl::Seconds(3))))
+      .WillOnce(Return(E("part")));
+  EXPECT_EQ(client.DownloadPart("s", part, sink, 6, nullptr, call), E("part"));
+}
+
 TEST(Client, PassesSessionsAndOperationsToItsConnection) {
   auto connection = std::make_shared<MockConnection>();
   Client client(connection);
@@ -141,9 +153,6 @@ TEST(Client, PassesSessionsAndOperationsToItsConnection) {
       .WillOnce(Return(E("vertex sizes")));
   EXPECT_CALL(*connection, DownloadMesh("s", ::testing::Ref(sink), std::optional<uint64_t>(6), _, is_call))
       .WillOnce(Return(E("download")));
-  const PartOptions part{.parts = 8, .part = 7};
-  EXPECT_CALL(*connection, DownloadPart("s", part, ::testing::Ref(sink), std::optional<uint64_t>(6), _, is_call))
-      .WillOnce(Return(E("part")));
   Mesh mesh;
   EXPECT_CALL(*connection, UpdateMesh("s", ::testing::Ref(mesh), _, is_call)).WillOnce(Return(E("update")));
   EXPECT_CALL(*connection, StartRefinement("s", Field(&RefinementOptions::restart, true), is_call))
@@ -165,7 +174,6 @@ TEST(Client, PassesSessionsAndOperationsToItsConnection) {
   EXPECT_EQ(client.SetSizes("s", samples, call).status(), E("sizes"));
   EXPECT_EQ(client.SetVertexSizes("s", vertex_sizes, call).status(), E("vertex sizes"));
   EXPECT_EQ(client.DownloadMesh("s", sink, 6, nullptr, call), E("download"));
-  EXPECT_EQ(client.DownloadPart("s", part, sink, 6, nullptr, call), E("part"));
   EXPECT_EQ(client.UpdateMesh("s", mesh, nullptr, call), E("update"));
   EXPECT_EQ(client.StartRefinement("s", {.restart = true}, call).status(), E("start"));
   EXPECT_EQ(client.GetOperation("o", call).status(), E("operation"));

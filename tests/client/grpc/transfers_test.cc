@@ -360,8 +360,8 @@ TEST(Download, OfAPartAsksForItAndGoesOn) {
   fill(7, *mesh.chunks[7].mutable_simplex_owners(), owners, 2);
   mesh.breaks_before = 5;
   MeshCollector sink;
-  const absl::Status status = server.Client().DownloadPart(
-      kSession, {.parts = 1, .part = 0, .ghost_layers = 3, .contiguous = true}, sink);
+  const absl::Status status =
+      server.Client().DownloadPart(kSession, {.parts = 1, .part = 0, .ghost_layers = 3, .contiguous = true}, sink);
   ASSERT_TRUE(status.ok()) << status;
   EXPECT_EQ(sink.mesh().part->vertex_ids, numbers);
   EXPECT_THAT(sink.mesh().part->simplex_owners, ElementsAre(0, 0));
