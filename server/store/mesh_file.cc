@@ -255,6 +255,19 @@ absl::StatusOr<core::Mesh> MeshFile::Load(const core::RunContext& context) const
 }
 
 absl::StatusOr<std::shared_ptr<const core::Mesh>> MeshFile::Whole(const core::RunContext& context) const {
+  {
+    const std::lock_guard lock(mutex_);
+    if (std::shared_ptr<const core::Mesh> whole = whole_.lock(); whole != nullptr) {
+      return whole;
+    }
+  }
+  WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<const core::Mesh> whole, LoadWhole(context));
+  const std::lock_guard lock(mutex_);
+  whole_ = whole;
+  return whole;
+}
+
+absl::StatusOr<std::shared_ptr<const core::Mesh>> MeshFile::LoadWhole(const core::RunContext& context) const {
   using Chunk = v1::MeshChunk;
   WELLSPACE_ASSIGN_OR_RETURN(core::Mesh loaded, Load(context));
   auto mesh = std::make_shared<core::Mesh>(std::move(loaded));

@@ -1,5 +1,6 @@
 #include "server/services/sessions/download_mesh_call.h"
 
+#include <algorithm>
 #include <limits>
 #include <utility>
 
@@ -15,8 +16,9 @@
 namespace wellspace::server {
 namespace {
 
-// Before a call asks again whose mesh another one cuts, or that found the queue full.
-constexpr absl::Duration kPartRetryDelay = absl::Milliseconds(50);
+// Before a call asks again whose mesh another one cuts, or that found the queue full, at most: so thousands of calls
+// that wait cost next to nothing.
+constexpr absl::Duration kMostRetryDelay = absl::Milliseconds(500);
 
 }  // namespace
 
@@ -105,7 +107,8 @@ void DownloadMeshCall::WantPart() {
 }
 
 void DownloadMeshCall::TryLater() {
-  environment().background.PostAfter(kPartRetryDelay, WeakCall(&DownloadMeshCall::TryAgain));
+  environment().background.PostAfter(retry_delay_, WeakCall(&DownloadMeshCall::TryAgain));
+  retry_delay_ = std::min(2 * retry_delay_, kMostRetryDelay);
 }
 
 void DownloadMeshCall::TryAgain() {

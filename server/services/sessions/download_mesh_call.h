@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "absl/time/time.h"
 #include "grpcpp/support/byte_buffer.h"
 #include "grpcpp/support/server_callback.h"
 #include "server/calls/call.h"
@@ -79,7 +80,8 @@ class DownloadMeshCall final
   std::vector<MeshDeltas::Delta> deltas_;     // to be sent in its place; none: it has not changed
   size_t delta_ = 0;                          // which of them is sent now
   std::shared_ptr<Job> job_;
-  std::shared_ptr<const PartSnapshot> part_;  // to be sent in the place of the mesh; null until taken
+  absl::Duration retry_delay_ = absl::Milliseconds(20);  // before WantPart is called again; grows
+  std::shared_ptr<const PartSnapshot> part_;             // to be sent in the place of the mesh; null until taken
   bool metadata_sent_ = false;
   uint64_t chunks_ = 0;  // of the mesh, or of the difference, for this call
   uint64_t next_chunk_ = 0;
