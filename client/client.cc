@@ -87,6 +87,12 @@ absl::Status Client::DownloadMesh(const std::string& session, MeshSink& sink, st
   return connection_->DownloadMesh(session, sink, revision, on_chunks, call);
 }
 
+absl::Status Client::DownloadPart(const std::string& session, const PartOptions& part, MeshSink& sink,
+                                  std::optional<uint64_t> revision, const OnChunks& on_chunks,
+                                  const CallOptions& call) {
+  return connection_->DownloadPart(session, part, sink, revision, on_chunks, call);
+}
+
 absl::Status Client::UpdateMesh(const std::string& session, Mesh& mesh, const OnChunks& on_chunks,
                                 const CallOptions& call) {
   return connection_->UpdateMesh(session, mesh, on_chunks, call);

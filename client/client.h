@@ -116,6 +116,14 @@ class Client {
   absl::Status DownloadMesh(const std::string& session, MeshSink& sink, std::optional<uint64_t> revision = std::nullopt,
                             const OnChunks& on_chunks = nullptr, const CallOptions& call = {});
 
+  // As DownloadMesh, one part of the mesh, for a solver on many ranks of which each asks for its own. The server cuts
+  // the mesh once for all that ask for as many parts; the same mesh and numbers always give the same parts. Ranks that
+  // are to have parts of one mesh ask for its `revision`. A MeshCollector has Mesh::part then; what is told of the
+  // run, as MeshHeader::statistics, is of the whole mesh.
+  absl::Status DownloadPart(const std::string& session, const PartOptions& part, MeshSink& sink,
+                            std::optional<uint64_t> revision = std::nullopt, const OnChunks& on_chunks = nullptr,
+                            const CallOptions& call = {});
+
   // Brings `mesh`, which a MeshCollector has got of the session, up to date: the differences since `mesh.revision` are
   // downloaded and applied, and its checksum looked at. Where the server does not have these differences, or `mesh` is
   // not what it was, all is downloaded. Then `mesh` is, to the bit, what DownloadMesh would bring. On an error it is as

@@ -69,6 +69,9 @@ class Connection {
                                                   const CallOptions& call) = 0;
   virtual absl::Status DownloadMesh(const std::string& session, MeshSink& sink, std::optional<uint64_t> revision,
                                     const OnChunks& on_chunks, const CallOptions& call) = 0;
+  virtual absl::Status DownloadPart(const std::string& session, const PartOptions& part, MeshSink& sink,
+                                    std::optional<uint64_t> revision, const OnChunks& on_chunks,
+                                    const CallOptions& call) = 0;
   virtual absl::Status UpdateMesh(const std::string& session, Mesh& mesh, const OnChunks& on_chunks,
                                   const CallOptions& call) = 0;
 

@@ -10,9 +10,14 @@ void SetHeader(const MeshHeader& header, Mesh& mesh) {
   mesh.regions = header.regions;
   mesh.statistics = header.statistics;
   mesh.revision = header.revision;
+  mesh.part.reset();
+  if (header.part.has_value()) {
+    static_cast<PartHeader&>(mesh.part.emplace()) = *header.part;
+  }
 }
 
 absl::Status MeshCollector::Begin(const MeshHeader& header) {
+  header_ = header;
   SetHeader(header, mesh_);
   return absl::OkStatus();
 }
@@ -64,6 +69,15 @@ absl::Status MeshCollector::AddFacets(std::span<const uint32_t> facets) {
 
 absl::Status MeshCollector::AddRidges(std::span<const uint32_t> ridges) {
   mesh_.ridges.insert(mesh_.ridges.end(), ridges.begin(), ridges.end());
+  return absl::OkStatus();
+}
+
+absl::Status MeshCollector::AddPartNumbers(PartNumbers array, std::span<const uint32_t> numbers) {
+  MeshPart& part = mesh_.part.value();
+  std::vector<uint32_t>* const arrays[] = {&part.vertex_ids,  &part.vertex_owners,  &part.vertex_rows,
+                                           &part.simplex_ids, &part.simplex_owners, &part.facet_ids};
+  std::vector<uint32_t>& values = *arrays[static_cast<int>(array)];
+  values.insert(values.end(), numbers.begin(), numbers.end());
   return absl::OkStatus();
 }
 

@@ -46,6 +46,10 @@ class MeshSink {
   virtual absl::Status AddFacets(std::span<const uint32_t> /*facets*/) { return absl::OkStatus(); }
   // Rows of 2 vertices: the edges on creases of a surface. Called only if there are any.
   virtual absl::Status AddRidges(std::span<const uint32_t> /*ridges*/) { return absl::OkStatus(); }
+  // Of a part: the next numbers of an array of it, one for each vertex, simplex or facet; array after array.
+  virtual absl::Status AddPartNumbers(PartNumbers /*array*/, std::span<const uint32_t> /*numbers*/) {
+    return absl::OkStatus();
+  }
   // The mesh is complete.
   virtual absl::Status Finish() = 0;
 };
@@ -70,12 +74,16 @@ class MeshCollector final : public MeshSink {
   absl::Status AddInputVertices(std::span<const uint32_t> vertices) override;
   absl::Status AddFacets(std::span<const uint32_t> facets) override;
   absl::Status AddRidges(std::span<const uint32_t> ridges) override;
+  absl::Status AddPartNumbers(PartNumbers array, std::span<const uint32_t> numbers) override;
   absl::Status Finish() override { return absl::OkStatus(); }
 
   // The mesh that has been collected; to be moved from when the mesh is complete.
   Mesh& mesh() { return mesh_; }
+  // The properties that came before its arrays.
+  const MeshHeader& header() const { return header_; }
 
  private:
+  MeshHeader header_;
   Mesh mesh_;
 };
 

@@ -271,6 +271,42 @@ struct Region {
   bool operator==(const Region&) const = default;
 };
 
+// The part of a mesh that is asked for, for solvers on many ranks; see the proto's MeshPartition.
+struct PartOptions {
+  uint32_t parts = 1;
+  uint32_t part = 0;  // from 0 to parts - 1
+  uint32_t ghost_layers = 1;
+  bool contiguous = false;
+
+  bool operator==(const PartOptions&) const = default;
+};
+
+// The part that a mesh is, and the whole that it is cut from; see the proto's MeshPartInfo.
+struct PartHeader {
+  uint32_t parts = 1;
+  uint32_t part = 0;
+  uint64_t own_vertex_count = 0;   // the first; others are ghosts' alone
+  uint64_t own_simplex_count = 0;  // the first; others are ghosts
+  uint64_t whole_vertex_count = 0;
+  uint64_t whole_simplex_count = 0;
+  uint64_t whole_facet_count = 0;
+
+  bool operator==(const PartHeader&) const = default;
+};
+
+// The arrays of numbers that a part has beside those of a mesh; see the proto's MeshChunk.
+enum class PartNumbers { kVertexIds, kVertexOwners, kVertexRows, kSimplexIds, kSimplexOwners, kFacetIds };
+
+// A part's place in its mesh.
+struct MeshPart : PartHeader {
+  std::vector<uint32_t> vertex_ids;     // by vertex: its number in the whole mesh
+  std::vector<uint32_t> vertex_owners;  // the part that owns it
+  std::vector<uint32_t> vertex_rows;    // its number where part after part is numbered, as solvers have rows
+  std::vector<uint32_t> simplex_ids;    // by simplex
+  std::vector<uint32_t> simplex_owners;
+  std::vector<uint32_t> facet_ids;  // by facet; the part owns all of them
+};
+
 // The properties of a mesh that come before its arrays.
 struct MeshHeader {
   int dimension = 0;
@@ -290,7 +326,8 @@ struct MeshHeader {
   std::vector<Region> regions;
   bool has_simplex_regions = false;  // if not, all are of the only region
   bool has_vertex_marks = false;
-  MeshStatistics statistics;
+  MeshStatistics statistics;       // of the whole mesh
+  std::optional<PartHeader> part;  // none: it is whole
 };
 
 struct Mesh {
@@ -312,7 +349,8 @@ struct Mesh {
   std::vector<int32_t> simplex_regions;  // empty: all are of the only region
   std::vector<Region> regions;
   MeshStatistics statistics;
-  uint64_t revision = 0;  // of the session's mesh; 0: of no session
+  uint64_t revision = 0;         // of the session's mesh; 0: of no session
+  std::optional<MeshPart> part;  // none: it is whole
 };
 
 // The size that a mesh would have.

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
@@ -22,15 +24,61 @@ uint64_t InputVerticesOf(const MeshStatistics& statistics) {
 
 }  // namespace
 
-absl::Status MeshFile::Begin(const MeshHeader& header) {
-  header_ = header;
-  for (BoundaryPart& part : header_.boundary) {
-    const auto named = part_names_.find(part.tag);
+formats::Mesh ToFormats(Mesh mesh) {
+  formats::Mesh converted{.dimension = mesh.dimension,
+                          .points = std::move(mesh.points),
+                          .simplices = std::move(mesh.simplices),
+                          .weights = std::move(mesh.weights),
+                          .vertex_origins = std::move(mesh.vertex_origins),
+                          .vertex_tags = std::move(mesh.vertex_tags),
+                          .facets = std::move(mesh.facets),
+                          .ridges = std::move(mesh.ridges),
+                          .simplex_regions = std::move(mesh.simplex_regions)};
+  for (BoundaryPart& part : mesh.boundary) {
+    converted.boundary.push_back({part.tag, std::move(part.name), part.facet_count});
+  }
+  for (Region& region : mesh.regions) {
+    converted.regions.push_back({region.id, std::move(region.name)});
+  }
+  return converted;
+}
+
+absl::Status WritePart(Mesh part, const std::string& path, const std::string& format, std::stop_token stop,
+                       std::vector<std::string>* notes) {
+  const MeshPart numbers = *std::exchange(part.part, std::nullopt);
+  const formats::PartNumbers of_file{.part = numbers.part,
+                                     .parts = numbers.parts,
+                                     .own_vertices = numbers.own_vertex_count,
+                                     .own_simplices = numbers.own_simplex_count,
+                                     .whole_simplices = numbers.whole_simplex_count,
+                                     .vertex_ids = numbers.vertex_ids,
+                                     .vertex_owners = numbers.vertex_owners,
+                                     .vertex_rows = numbers.vertex_rows,
+                                     .simplex_ids = numbers.simplex_ids,
+                                     .simplex_owners = numbers.simplex_owners,
+                                     .facet_ids = numbers.facet_ids};
+  const formats::Mesh mesh = ToFormats(std::move(part));
+  formats::MeshView view = mesh.View();
+  view.part = &of_file;
+  return formats::WriteMesh(path, format, view, stop, notes);
+}
+
+void NameParts(const std::map<int32_t, std::string>& names, std::vector<BoundaryPart>& boundary) {
+  for (BoundaryPart& part : boundary) {
+    const auto named = names.find(part.tag);
     // Parts without a marker have the tags that no marker has.
-    if (named != part_names_.end() && part.name == absl::StrCat("marker_", part.tag)) {
+    if (named != names.end() && part.name == absl::StrCat("marker_", part.tag)) {
       part.name = named->second;
     }
   }
+}
+
+absl::Status MeshFile::Begin(const MeshHeader& header) {
+  if (header.part.has_value()) {  // its numbers come last, and have their place in the middle of files
+    return absl::InvalidArgumentError("a part of a mesh is collected by a MeshCollector, and written by WritePart");
+  }
+  header_ = header;
+  client::NameParts(part_names_, header_.boundary);
   formats::MeshShape shape = {
       .dimension = header.dimension,
       .vertex_count = header.vertex_count,

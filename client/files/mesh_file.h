@@ -12,12 +12,28 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "client/formats/mesh.h"
 #include "client/formats/write_mesh.h"
 #include "client/mesh_sink.h"
+#include "client/types.h"
 
 namespace wellspace::client {
 
-// Writes a mesh to a file, in the memory of formats::MeshWriter. The file appears complete or not at all.
+// A mesh as files hold it, without which vertex each input point became, and what is told of the run.
+formats::Mesh ToFormats(Mesh mesh);
+
+// Writes a part of a mesh, as MeshCollector has it, to a .vtu or .npz.
+//
+// REQUIRES:   `part` has Mesh::part.
+// Errors:     as of formats::WriteMesh.
+absl::Status WritePart(Mesh part, const std::string& path, const std::string& format, std::stop_token stop,
+                       std::vector<std::string>* notes);
+
+// Gives parts of the boundary that have tags of markers, but no names, these names.
+void NameParts(const std::map<int32_t, std::string>& names, std::vector<BoundaryPart>& boundary);
+
+// Writes a mesh to a file, in the memory of formats::MeshWriter. The file appears complete or not at all. A part of a
+// mesh is collected, and written by WritePart.
 //
 // Errors:     as of formats::CreateMesh and formats::MeshWriter.
 // Thread safety: thread-compatible.

@@ -350,9 +350,20 @@ MeshHeader HeaderFromProto(const v1::MeshMetadata& metadata) {
                     .regions = {},
                     .has_simplex_regions = metadata.has_simplex_regions(),
                     .has_vertex_marks = metadata.has_vertex_marks(),
-                    .statistics = StatisticsFromProto(metadata.statistics())};
+                    .statistics = StatisticsFromProto(metadata.statistics()),
+                    .part = std::nullopt};
   for (const v1::BoundaryPart& part : metadata.boundary()) {
     header.boundary.push_back({part.tag(), part.name(), part.facet_count()});
+  }
+  if (metadata.has_part()) {
+    const v1::MeshPartInfo& part = metadata.part();
+    header.part = {.parts = part.parts(),
+                   .part = part.part(),
+                   .own_vertex_count = part.own_vertex_count(),
+                   .own_simplex_count = part.own_simplex_count(),
+                   .whole_vertex_count = part.whole_vertex_count(),
+                   .whole_simplex_count = part.whole_simplex_count(),
+                   .whole_facet_count = part.whole_facet_count()};
   }
   for (const v1::Region& region : metadata.regions()) {
     header.regions.push_back({region.id(), region.name()});

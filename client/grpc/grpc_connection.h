@@ -7,6 +7,7 @@
 #include <string>
 
 #include "client/connection.h"
+#include "client/grpc/mesh_receiver.h"
 #include "client/grpc/retry.h"
 #include "client/grpc/servers.h"
 
@@ -55,6 +56,9 @@ class GrpcConnection final : public Connection {
                                           const CallOptions& call) override;
   absl::Status DownloadMesh(const std::string& session, MeshSink& sink, std::optional<uint64_t> revision,
                             const OnChunks& on_chunks, const CallOptions& call) override;
+  absl::Status DownloadPart(const std::string& session, const PartOptions& part, MeshSink& sink,
+                            std::optional<uint64_t> revision, const OnChunks& on_chunks,
+                            const CallOptions& call) override;
 
   // updates.cc
   absl::Status UpdateMesh(const std::string& session, Mesh& mesh, const OnChunks& on_chunks,
@@ -112,6 +116,10 @@ class GrpcConnection final : public Connection {
   // `fill` puts the sizes from a number on into a request, and returns the number after the last.
   absl::StatusOr<SizesSet> SendAllSizes(const std::string& session, size_t count, const CallOptions& call,
                                         const FillSizesRequest& fill);
+
+  // Downloads what `request` asks for, but for the session and the place to begin, into `receiver`.
+  absl::Status Download(const std::string& session, std::optional<uint64_t> revision, v1::DownloadMeshRequest& request,
+                        MeshReceiver& receiver, const OnChunks& on_chunks, const CallOptions& call);
 
   // One request of AddVertices.
   absl::StatusOr<AddedVertices> AddSome(const v1::AddVerticesRequest& request, const CallOptions& call);

@@ -23,9 +23,10 @@ constexpr uint64_t kMaxVertices = std::numeric_limits<uint32_t>::max();
 constexpr uint64_t kMaxSimplices = uint64_t{1} << 40;
 constexpr uint64_t kMaxInputPoints = uint64_t{1} << 40;
 
-constexpr const char* kArrayNames[] = {"points",         "weights",         "vertex origins",
-                                       "vertex tags",    "simplex regions", "simplices",
-                                       "input vertices", "facets",          "ridges"};
+constexpr const char* kArrayNames[] = {"points",          "weights",        "vertex origins", "vertex tags",
+                                       "simplex regions", "simplices",      "input vertices", "facets",
+                                       "ridges",          "vertex ids",     "vertex owners",  "vertex rows",
+                                       "simplex ids",     "simplex owners", "facet ids"};
 
 template <typename T>
 std::span<const T> SpanOf(const google::protobuf::RepeatedField<T>& values) {
@@ -57,9 +58,40 @@ auto VisitArray(const v1::MeshChunk& chunk, int array, Visit visit) {
       return visit(chunk.input_vertices());
     case 7:
       return visit(chunk.facets());
-    default:
+    case 8:
       return visit(chunk.ridges());
+    case 9:
+      return visit(chunk.vertex_ids());
+    case 10:
+      return visit(chunk.vertex_owners());
+    case 11:
+      return visit(chunk.vertex_rows());
+    case 12:
+      return visit(chunk.simplex_ids());
+    case 13:
+      return visit(chunk.simplex_owners());
+    default:
+      return visit(chunk.facet_ids());
   }
+}
+
+// The numbers of an array of a part.
+std::span<const uint32_t> PartNumbersOf(const v1::MeshChunk& chunk, PartNumbers array) {
+  switch (array) {
+    case PartNumbers::kVertexIds:
+      return SpanOf(chunk.vertex_ids());
+    case PartNumbers::kVertexOwners:
+      return SpanOf(chunk.vertex_owners());
+    case PartNumbers::kVertexRows:
+      return SpanOf(chunk.vertex_rows());
+    case PartNumbers::kSimplexIds:
+      return SpanOf(chunk.simplex_ids());
+    case PartNumbers::kSimplexOwners:
+      return SpanOf(chunk.simplex_owners());
+    case PartNumbers::kFacetIds:
+      break;
+  }
+  return SpanOf(chunk.facet_ids());
 }
 
 // Names go to terminals, and to files of text.
@@ -77,7 +109,7 @@ bool IsTheSame(const MeshHeader& a, const MeshHeader& b) {
          a.chunk_count == b.chunk_count && a.has_weights == b.has_weights &&
          a.moved_vertex_count == b.moved_vertex_count && a.boundary == b.boundary && a.regions == b.regions &&
          a.has_simplex_regions == b.has_simplex_regions && a.has_vertex_marks == b.has_vertex_marks &&
-         a.ridge_count == b.ridge_count;
+         a.ridge_count == b.ridge_count && a.part == b.part;
 }
 
 absl::Status CheckBoundary(const MeshHeader& header) {
@@ -103,6 +135,28 @@ absl::Status CheckBoundary(const MeshHeader& header) {
       return Contradiction("a region with the id ", region.id, "; ids are above 0, each once");
     }
     WELLSPACE_RETURN_IF_ERROR(CheckName(region.name));
+  }
+  return absl::OkStatus();
+}
+
+// A part is the one that was asked for, and no larger than the whole.
+absl::Status CheckPart(const MeshHeader& header, const std::optional<PartOptions>& wanted) {
+  if (!header.part.has_value()) {
+    return wanted.has_value() ? absl::UnimplementedError("the server is too old for parts: it sends the whole mesh")
+                              : absl::OkStatus();
+  }
+  const PartHeader& part = *header.part;
+  if (!wanted.has_value() || part.parts != wanted->parts || part.part != wanted->part) {
+    return Contradiction("part ", part.part, " of ", part.parts, ", which was not asked for");
+  }
+  if (part.own_vertex_count > header.vertex_count || header.vertex_count > part.whole_vertex_count ||
+      part.own_simplex_count > header.simplex_count || header.simplex_count > part.whole_simplex_count ||
+      header.facet_count > part.whole_facet_count || part.whole_vertex_count > kMaxVertices ||
+      part.whole_simplex_count > kMaxSimplices || part.whole_facet_count > kMaxSimplices) {
+    return Contradiction("a part of ", header.vertex_count, " vertices, ", header.simplex_count, " simplices and ",
+                         header.facet_count, " facets, which owns ", part.own_vertex_count, " and ",
+                         part.own_simplex_count, ", of ", part.whole_vertex_count, ", ", part.whole_simplex_count,
+                         " and ", part.whole_facet_count, " of the whole mesh");
   }
   return absl::OkStatus();
 }
@@ -145,7 +199,8 @@ absl::Status CheckHeader(const MeshHeader& header, const MeshExpectation& expect
     }
   }
   WELLSPACE_RETURN_IF_ERROR(CheckLeftSlivers(header));
-  return CheckBoundary(header);
+  WELLSPACE_RETURN_IF_ERROR(CheckBoundary(header));
+  return CheckPart(header, expectation.part);
 }
 
 uint64_t MeshReceiver::WidthOf(int array) const {
@@ -166,7 +221,13 @@ uint64_t MeshReceiver::SizeOf(int array) const {
                                               header_.simplex_count,
                                               header_.input_point_count,
                                               header_.facet_count,
-                                              header_.ridge_count};
+                                              header_.ridge_count,
+                                              if_any(header_.part.has_value(), header_.vertex_count),
+                                              if_any(header_.part.has_value(), header_.vertex_count),
+                                              if_any(header_.part.has_value(), header_.vertex_count),
+                                              if_any(header_.part.has_value(), header_.simplex_count),
+                                              if_any(header_.part.has_value(), header_.simplex_count),
+                                              if_any(header_.part.has_value(), header_.facet_count)};
   return rows[array] * WidthOf(array);
 }
 
@@ -281,8 +342,12 @@ absl::Status MeshReceiver::CheckValues(Array array, const v1::MeshChunk& chunk) 
       return CheckInputVertices(header_, SpanOf(chunk.input_vertices()));
     case kFacets:
       return CheckVertices(header_, kArrayNames[array], SpanOf(chunk.facets()));
-    default:
+    case kRidges:
       return CheckVertices(header_, kArrayNames[array], SpanOf(chunk.ridges()));
+    default: {
+      const auto numbers = static_cast<PartNumbers>(array - kPartNumbers);
+      return CheckPartNumbers(header_, numbers, received_[array], PartNumbersOf(chunk, numbers));
+    }
   }
 }
 
@@ -307,8 +372,12 @@ absl::Status MeshReceiver::Pass(Array array, const v1::MeshChunk& chunk) {
       return sink_.AddInputVertices(SpanOf(chunk.input_vertices()));
     case kFacets:
       return sink_.AddFacets(SpanOf(chunk.facets()));
-    default:
+    case kRidges:
       return sink_.AddRidges(SpanOf(chunk.ridges()));
+    default: {
+      const auto numbers = static_cast<PartNumbers>(array - kPartNumbers);
+      return sink_.AddPartNumbers(numbers, PartNumbersOf(chunk, numbers));
+    }
   }
 }
 

@@ -14,13 +14,14 @@ namespace wellspace::client {
 
 // The known facts about a mesh.
 struct MeshExpectation {
-  std::optional<int> dimension;
-  std::optional<uint64_t> input_points;
+  std::optional<int> dimension{};
+  std::optional<uint64_t> input_points{};
+  std::optional<PartOptions> part{};  // that was asked for; none: the whole mesh was
 };
 
 // Whether there can be such a mesh.
 //
-// Errors:     DATA_LOSS, naming the fault.
+// Errors:     DATA_LOSS, naming the fault; UNIMPLEMENTED: a whole mesh of a server that is too old for parts.
 absl::Status CheckHeader(const MeshHeader& header, const MeshExpectation& expectation);
 
 // Takes the metadata, then the chunks in their order; right ones go to a sink at once.
@@ -63,7 +64,8 @@ class MeshReceiver {
     kInputVertices,
     kFacets,
     kRidges,
-    kArrays
+    kPartNumbers,  // the first of them, as PartNumbers has them
+    kArrays = kPartNumbers + static_cast<int>(PartNumbers::kFacetIds) + 1
   };
 
   uint64_t WidthOf(int array) const;
@@ -73,7 +75,7 @@ class MeshReceiver {
   absl::Status CheckMoved(const v1::MeshChunk& chunk, uint64_t first) const;
   // Whether the values can be those of the array: vertices that there are, tags and regions that were announced.
   absl::Status CheckValues(Array array, const v1::MeshChunk& chunk) const;
-  // Hands values that were checked to the sink.
+  // Hands values that were checked to the sink. The last six arrays are those of a part.
   absl::Status Pass(Array array, const v1::MeshChunk& chunk);
 
   MeshSink& sink_;

@@ -40,6 +40,12 @@ absl::Status CheckOrigins(const MeshHeader& header, std::span<const uint32_t> or
 absl::Status CheckTags(const MeshHeader& header, std::span<const int32_t> tags);
 // Regions are those of the header.
 absl::Status CheckRegions(const MeshHeader& header, std::span<const int32_t> ids);
+// Numbers of a part are those of vertices, simplices, facets and parts that there are; of what is owned, and of nothing
+// else, the owner is the part itself. `first`: how many numbers of the array came before.
+//
+// REQUIRES:   header.part is there.
+absl::Status CheckPartNumbers(const MeshHeader& header, PartNumbers array, uint64_t first,
+                              std::span<const uint32_t> numbers);
 
 }  // namespace wellspace::client
 

@@ -212,18 +212,37 @@ absl::StatusOr<Uploaded> GrpcConnection::UploadPoints(const std::string& session
 
 absl::Status GrpcConnection::DownloadMesh(const std::string& session, MeshSink& sink, std::optional<uint64_t> revision,
                                           const OnChunks& on_chunks, const CallOptions& call) {
-  MeshReceiver receiver(sink, {.dimension = std::nullopt, .input_points = std::nullopt});
+  v1::DownloadMeshRequest request;
+  request.set_with_boundary(sink.WantsBoundary());
+  MeshReceiver receiver(sink, {});
+  return Download(session, revision, request, receiver, on_chunks, call);
+}
+
+absl::Status GrpcConnection::DownloadPart(const std::string& session, const PartOptions& part, MeshSink& sink,
+                                          std::optional<uint64_t> revision, const OnChunks& on_chunks,
+                                          const CallOptions& call) {
+  v1::DownloadMeshRequest request;
+  request.set_with_boundary(sink.WantsBoundary());
+  request.mutable_partition()->set_parts(part.parts);
+  request.mutable_partition()->set_part(part.part);
+  request.mutable_partition()->set_ghost_layers(part.ghost_layers);
+  request.mutable_partition()->set_contiguous(part.contiguous);
+  MeshReceiver receiver(sink, {.part = part});
+  return Download(session, revision, request, receiver, on_chunks, call);
+}
+
+absl::Status GrpcConnection::Download(const std::string& session, std::optional<uint64_t> revision,
+                                      v1::DownloadMeshRequest& request, MeshReceiver& receiver,
+                                      const OnChunks& on_chunks, const CallOptions& call) {
+  request.set_name(session);
+  if (revision.has_value()) {
+    request.set_revision(*revision);
+  }
   return RunOn(session, call, [&](const Server& server, Attempt& attempt) {
-    v1::DownloadMeshRequest request;
-    request.set_name(session);
     if (receiver.has_metadata()) {
-      revision = receiver.header().revision;
-    }
-    if (revision.has_value()) {
-      request.set_revision(*revision);
+      request.set_revision(receiver.header().revision);
     }
     request.set_next_chunk(receiver.next_chunk());
-    request.set_with_boundary(sink.WantsBoundary());
     receiver.Continue();
     CallContext context(attempt);
     const std::unique_ptr<grpc::ClientReader<v1::DownloadMeshResponse>> stream =

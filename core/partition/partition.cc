@@ -13,6 +13,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -81,13 +82,12 @@ int CutByMetis(const DualGraph& graph, const PartitionOptions& options, idx_t* p
                              nullptr, metis_options, &cut, part_of);
 }
 
-// Waits until the process has ended, or kills it when the run is cancelled. `exit_code` is its exit code, or -1 if a
-// signal ended it.
-absl::Status WaitFor(pid_t process, const RunContext& context, int& exit_code) {
+// Waits until the process has ended, or kills it when the run is cancelled. Where signals of ended processes are
+// ignored, as some parents have it, nothing is known of how it has ended.
+absl::Status WaitFor(pid_t process, const RunContext& context) {
   absl::Status status;
-  int state = 0;
   for (;;) {
-    const pid_t ended = waitpid(process, &state, status.ok() ? WNOHANG : 0);
+    const pid_t ended = waitpid(process, nullptr, status.ok() ? WNOHANG : 0);
     if (ended == process || (ended < 0 && errno != EINTR)) {
       break;
     }
@@ -100,66 +100,101 @@ absl::Status WaitFor(pid_t process, const RunContext& context, int& exit_code) {
       poll(nullptr, 0, kPollMilliseconds);
     }
   }
-  exit_code = WIFEXITED(state) ? WEXITSTATUS(state) : -1;
   return status;
 }
 
-// METIS in a process of its own, which ends with 0 if all is well.
+// METIS in a process of its own. `part_of` has a number more than there are simplices, and it is 0: the process writes
+// 1 there once all is well.
 absl::Status CutApart(const DualGraph& graph, const PartitionOptions& options, const RunContext& context,
                       idx_t* part_of) {
+  volatile idx_t& is_done = part_of[graph.simplex_count()];
   const pid_t process = fork();
   if (process < 0) {
     return absl::ResourceExhaustedError(absl::StrCat("no process for a partition: ", std::strerror(errno)));
   }
   if (process == 0) {
     prctl(PR_SET_PDEATHSIG, SIGKILL);  // it does not outlive this process
-    // METIS writes its complaints there.
-    close(STDOUT_FILENO);
-    close(STDERR_FILENO);
-    _exit(CutByMetis(graph, options, part_of) == METIS_OK ? 0 : 1);
+    // METIS writes its complaints to standard output and error. The others are connections and files of a server, which
+    // may want to close them meanwhile.
+    close_range(STDOUT_FILENO, ~0U, 0);
+    is_done = CutByMetis(graph, options, part_of) == METIS_OK ? 1 : 0;
+    _exit(0);
   }
-  int exit_code = 0;
-  WELLSPACE_RETURN_IF_ERROR(WaitFor(process, context, exit_code));
-  return exit_code == 0 ? absl::OkStatus()
-                        : absl::ResourceExhaustedError(absl::StrCat("METIS could not cut ", graph.simplex_count(),
-                                                                    " simplices into ", options.parts,
-                                                                    " parts; most likely it was out of memory"));
+  WELLSPACE_RETURN_IF_ERROR(WaitFor(process, context));
+  return is_done == 1 ? absl::OkStatus()
+                      : absl::ResourceExhaustedError(absl::StrCat("METIS could not cut ", graph.simplex_count(),
+                                                                  " simplices into ", options.parts,
+                                                                  " parts; most likely it was out of memory"));
 }
 
-// Gives simplices of the largest parts to those that are empty or, if `most` is there, of those that are larger than it
-// to the smallest: the last ones in the order of their numbers.
-void EvenOut(uint32_t parts, uint64_t most, HugeVector<uint32_t>& part_of) {
+// The sizes that parts are to have, of which the largest or the smallest is found at once. There may be a million.
+class WantedSizes {
+ public:
+  explicit WantedSizes(const std::vector<uint64_t>& sizes) : sizes_(sizes) {
+    for (uint32_t part = 0; part < sizes.size(); ++part) {
+      by_size_.emplace(sizes[part], part);
+    }
+  }
+
+  uint64_t operator[](uint32_t part) const { return sizes_[part]; }
+  // Of as many parts as have that size, the one with the lowest number.
+  uint32_t Smallest() const { return by_size_.begin()->second; }
+  uint32_t Largest() const { return by_size_.lower_bound({by_size_.rbegin()->first, 0})->second; }
+  // One simplex goes from `from` to `to`.
+  void Move(uint32_t from, uint32_t to) {
+    Set(from, sizes_[from] - 1);
+    Set(to, sizes_[to] + 1);
+  }
+
+ private:
+  void Set(uint32_t part, uint64_t size) {
+    by_size_.erase({sizes_[part], part});
+    sizes_[part] = size;
+    by_size_.emplace(size, part);
+  }
+
+  std::vector<uint64_t> sizes_;
+  std::set<std::pair<uint64_t, uint32_t>> by_size_;
+};
+
+// Gives simplices of the largest parts to those that are empty and, of those that have more than `most`, to the
+// smallest: the last ones in the order of their numbers.
+//
+// Complexity: O(m), and O(log parts) for each simplex that is given.
+absl::Status EvenOut(uint32_t parts, uint64_t most, const RunContext& context, HugeVector<uint32_t>& part_of) {
   std::vector<uint64_t> sizes(parts, 0);
   for (const uint32_t part : part_of) {
     ++sizes[part];
   }
-  std::vector<uint32_t> short_of;
+  if (std::all_of(sizes.begin(), sizes.end(), [most](uint64_t size) { return size > 0 && size <= most; })) {
+    return absl::OkStatus();
+  }
+  WantedSizes wanted(sizes);
+  std::vector<uint32_t> short_of;  // of a simplex each
+  const auto give = [&](uint32_t from, uint32_t to) {
+    wanted.Move(from, to);
+    short_of.push_back(to);
+    return short_of.size() % kStepsBetweenChecks == 0 ? context.Check() : absl::OkStatus();
+  };
   for (uint32_t part = 0; part < parts; ++part) {
-    for (uint64_t missing = sizes[part] == 0 ? 1 : 0; missing > 0; --missing) {
-      short_of.push_back(part);
+    if (sizes[part] == 0) {
+      WELLSPACE_RETURN_IF_ERROR(give(wanted.Largest(), part));
     }
   }
-  std::vector<uint64_t> kept = sizes;
-  for (size_t i = 0; i < short_of.size(); ++i) {
-    --*std::max_element(kept.begin(), kept.end());
-    kept[short_of[i]] += 1;
-  }
   for (uint32_t part = 0; part < parts; ++part) {
-    while (kept[part] > most) {
-      const auto smallest = std::min_element(kept.begin(), kept.end());
-      --kept[part];
-      ++*smallest;
-      short_of.push_back(static_cast<uint32_t>(smallest - kept.begin()));
+    while (wanted[part] > most) {
+      WELLSPACE_RETURN_IF_ERROR(give(part, wanted.Smallest()));
     }
   }
   for (uint64_t s = part_of.size(); s-- > 0 && !short_of.empty();) {
     uint64_t& size = sizes[part_of[s]];
-    if (size > kept[part_of[s]]) {
+    if (size > wanted[part_of[s]]) {
       --size;
       part_of[s] = short_of.back();
       short_of.pop_back();
     }
   }
+  return absl::OkStatus();
 }
 
 }  // namespace
@@ -226,7 +261,7 @@ absl::StatusOr<HugeVector<uint32_t>> Partition(const DualGraph& graph, const Par
   if (options.parts == 1) {
     return part_of;
   }
-  const SharedParts shared(count);
+  const SharedParts shared(count + 1);
   if (!shared.is_there()) {
     return absl::ResourceExhaustedError(absl::StrCat("no memory for the parts of ", count, " simplices"));
   }
@@ -236,7 +271,7 @@ absl::StatusOr<HugeVector<uint32_t>> Partition(const DualGraph& graph, const Par
   const auto allowed =
       static_cast<uint64_t>((1 + kMostImbalance) * static_cast<double>(count) / static_cast<double>(options.parts));
   const uint64_t most = options.contiguous ? count : std::max(allowed, mean + 1);
-  EvenOut(options.parts, most, part_of);
+  WELLSPACE_RETURN_IF_ERROR(EvenOut(options.parts, most, context, part_of));
   return part_of;
 }
 

@@ -132,4 +132,10 @@ bool IsSmallAddition(uint64_t points, uint64_t vertices, uint64_t steps) {
   return points <= kMostAdded && steps * vertices <= kMostReplayed;
 }
 
+bool IsSmallPart(bool is_cut, uint64_t simplices) {
+  constexpr uint64_t kMostCut = 200'000;
+  constexpr uint64_t kMostTakenFrom = 10'000'000;
+  return simplices <= (is_cut ? kMostTakenFrom : kMostCut);
+}
+
 }  // namespace wellspace::server

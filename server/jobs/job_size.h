@@ -28,6 +28,9 @@ bool IsSmallRefinement(const core::MeshParameters& parameters, std::span<const d
 bool IsSmallEstimate(int dimension, uint64_t points);
 bool IsSmallAddition(uint64_t points, uint64_t vertices, uint64_t steps);
 
+// As above, of a part of a mesh that is taken out of it, which may have to be cut first.
+bool IsSmallPart(bool is_cut, uint64_t simplices);
+
 }  // namespace wellspace::server
 
 #endif  // WELLSPACE_SERVER_JOBS_JOB_SIZE_H_

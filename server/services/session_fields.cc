@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "core/base/status_macros.h"
+#include "core/partition/partition.h"
 #include "server/services/page_token.h"
 #include "server/wire/convert.h"
 #include "server/wire/errors.h"
@@ -19,6 +20,7 @@ constexpr size_t kMaxKeyCharacters = 63;
 constexpr size_t kMaxValueCharacters = 255;
 constexpr size_t kMaxParametersBytes = size_t{kMaxResponseBytes} / 2;
 constexpr absl::Duration kMinTtl = absl::Seconds(1);
+constexpr uint32_t kMostGhostLayers = 16;
 constexpr int32_t kNanosPerSecond = 1'000'000'000;
 
 // Of UTF-8, which protocol buffers have checked.
@@ -82,6 +84,32 @@ absl::StatusOr<size_t> PageSizeFromProto(const int32_t* page_size) {
                    "page_size");
   }
   return std::min(*page_size, kMaxPageSize);
+}
+
+absl::Status CheckPartition(const v1::MeshPartition& partition) {
+  if (partition.parts() == 0 || partition.parts() > core::kMaxParts) {
+    return Invalid(absl::StrCat("partition.parts is ", partition.parts(), "; expected 1 to ", core::kMaxParts),
+                   "partition.parts");
+  }
+  if (partition.part() >= partition.parts()) {
+    return Invalid(absl::StrCat("partition.part is ", partition.part(), "; of ", partition.parts(),
+                                " parts, which are numbered from 0, the last is ", partition.parts() - 1),
+                   "partition.part");
+  }
+  if (partition.ghost_layers() > kMostGhostLayers) {
+    return Invalid(
+        absl::StrCat("partition.ghost_layers is ", partition.ghost_layers(), "; expected 0 to ", kMostGhostLayers),
+        "partition.ghost_layers");
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckPartitionOf(uint64_t simplices, const v1::MeshPartition& partition) {
+  return partition.parts() <= simplices
+             ? absl::OkStatus()
+             : Invalid(absl::StrCat("partition.parts is ", partition.parts(), "; the mesh has ", simplices,
+                                    " simplices, and each part has at least one"),
+                       "partition.parts");
 }
 
 absl::StatusOr<uint64_t> RevisionFromProto(bool is_sent, uint64_t revision, const std::string& field) {

@@ -16,6 +16,7 @@
 #include "server/base/options.h"
 #include "server/sessions/session.h"
 #include "wellspace/v1/mesh.pb.h"
+#include "wellspace/v1/sessions.pb.h"
 
 namespace wellspace::server {
 
@@ -55,6 +56,13 @@ template <typename Request>
 absl::StatusOr<uint64_t> ExpectedRevisionOf(const Request& request) {
   return RevisionFromProto(request.has_expected_revision(), request.expected_revision(), "expected_revision");
 }
+
+// Refuses a partition that no mesh has.
+//
+// Errors:     INVALID_REQUEST, with the path of the first wrong field; so the following.
+absl::Status CheckPartition(const v1::MeshPartition& partition);
+// Refuses one that a mesh of so many simplices does not have.
+absl::Status CheckPartitionOf(uint64_t simplices, const v1::MeshPartition& partition);
 
 // The position of `token` in `list`; `begin` if it is empty.
 //

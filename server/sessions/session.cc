@@ -355,8 +355,8 @@ std::optional<Session::Spare> Session::GetSpare() const {
   if (!log_.is_durable() || !occupancy_.IsIdle()) {
     return std::nullopt;
   }
-  const uint64_t bytes =
-      (work_.mesher == nullptr ? 0 : work_.memory.bytes()) + locator_.SpareBytes() + deltas_.memory_bytes();
+  const uint64_t bytes = (work_.mesher == nullptr ? 0 : work_.memory.bytes()) + locator_.SpareBytes() +
+                         cuts_.SpareBytes() + deltas_.memory_bytes();
   const Lease& lease = occupancy_.lease;
   return bytes == 0
              ? std::nullopt
@@ -365,22 +365,31 @@ std::optional<Session::Spare> Session::GetSpare() const {
 
 uint64_t Session::GiveUpMesher() {
   SessionWork given_up;
-  std::shared_ptr<const LocatedMesh> located;
+  std::vector<SessionLocator::Made> located;
+  std::vector<SessionCuts::Made> cuts;
   std::vector<MeshDeltas::Delta> deltas;
-  uint64_t delta_bytes = 0;
+  uint64_t bytes = 0;
   {
     absl::MutexLock lock(&mutex_);
     if (!log_.is_durable() || !occupancy_.IsIdle() || occupancy_.queries > 0) {
       return 0;
     }
     located = locator_.GiveUp();
+    cuts = cuts_.GiveUp();
     given_up = work_.TakeMesher();
-    delta_bytes = deltas_.memory_bytes();
+    bytes = deltas_.memory_bytes();
     deltas = deltas_.GiveUp();
   }
-  const uint64_t bytes = given_up.memory.bytes() + (located == nullptr ? 0 : located->memory.bytes()) + delta_bytes;
+  bytes += given_up.memory.bytes();
+  for (const SessionLocator::Made& one : located) {
+    bytes += one->memory.bytes();
+  }
+  for (const SessionCuts::Made& one : cuts) {
+    bytes += one->memory.bytes();
+  }
   given_up.mesher = nullptr;  // before others may have its memory
-  located = nullptr;
+  located.clear();
+  cuts.clear();
   deltas.clear();
   given_up.memory.Release();
   return bytes;

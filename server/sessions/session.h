@@ -26,6 +26,7 @@
 #include "server/jobs/job.h"
 #include "server/jobs/memory_budget.h"
 #include "server/sessions/answer_to.h"
+#include "server/sessions/mesh_cut.h"
 #include "server/sessions/mesh_deltas.h"
 #include "server/sessions/occupancy.h"
 #include "server/sessions/operation.h"
@@ -66,7 +67,7 @@ struct PointsLeft {
 //   session_points.cc      uploads                           session_features.cc    features
 //   session_removal.cc     points that are taken out         session_operations.cc  operations
 //   session_sizes.cc       sizes at points                   session_structure.cc   the mesher that is built again,
-//                                                            vertices that are added, the locator
+//                                                            vertices that are added, the locator, cuts
 //
 // States, and their changes: docs/design/sessions.md, "States".
 //
@@ -213,16 +214,17 @@ class Session {
   };
   // Nothing of a session that is busy, or whose structure is in use, or which ends with the process.
   std::optional<Spare> GetSpare() const;
-  // To be called, without a lock, where the session was busy, or its structure or its locator in use: it may be spared.
+  // To be called, without a lock, where the session was busy, or its structure, its locator or a cut in use: it may be
+  // spared.
   void NoteIdle() const;
-  // Gives the mesher up for other work, the locator, and the differences of meshes. The first two come
-  // back as PrepareStructure, PrepareLocator and operations say. Returns how much memory that has freed: 0, and nothing
-  // is done, where there is nothing to spare.
+  // Gives the mesher up for other work, the locator, cuts, and the differences of meshes. All but the last come
+  // back as PrepareStructure, PrepareLocator, PrepareCut and operations say. Returns how much memory that has freed: 0,
+  // and nothing is done, where there is nothing to spare.
   //
   // Complexity: that of freeing the mesher, on this thread, without a lock.
   uint64_t GiveUpMesher();
 
-  // ---- The structure, vertices that are added, and the locator: session_structure.cc ----
+  // ---- The structure, vertices that are added, the locator, and cuts: session_structure.cc ----
 
   // Makes sure that the session has a structure for queries and additions. Where the mesher was given up, `job` builds
   // it again, on this thread, a worker's. `*is_at_work`: another job builds it now, and the status is SESSION_BUSY.
@@ -244,10 +246,21 @@ class Session {
                                             uint64_t expected_revision, core::RunContext& context,
                                             const AnswerTo<AddedVertices>& answer = nullptr);
 
-  // The session's last mesh, for points to be located in, as SessionLocator::Prepare says. `revision` 0: any.
+  // The session's last mesh, for points to be located in: the kept one, or made by `job`. `revision` 0: any.
   //
-  // Errors:     MESH_NOT_READY, REVISION_MISMATCH, SESSION_NOT_FOUND; of making it: MEMORY_LIMIT, CANCELLED, DATA_LOSS.
+  // Errors:     MESH_NOT_READY, REVISION_MISMATCH, SESSION_NOT_FOUND; those of MakeLocated.
   absl::StatusOr<std::shared_ptr<const LocatedMesh>> PrepareLocator(uint64_t revision, Job& job);
+
+  // The cut of `mesh`, a mesh of the session: the kept one, or made by `job`. `*is_at_work`: another job makes one
+  // now, and the cut is null; to be tried again.
+  //
+  // Errors:     SESSION_NOT_FOUND; those of CutIntoParts.
+  absl::StatusOr<std::shared_ptr<const MeshCut>> PrepareCut(const std::shared_ptr<const MeshSnapshot>& mesh,
+                                                            const core::PartitionOptions& options, Job& job,
+                                                            bool* is_at_work);
+  // Whether PrepareCut would return a kept cut, and whether another job makes one now.
+  bool HasCut(const MeshSnapshot& mesh, const core::PartitionOptions& options) const;
+  bool IsCutting() const { return cuts_.IsMaking(); }
 
   // The size of the inputs that there are to work on.
   struct Size {
@@ -380,8 +393,9 @@ class Session {
   // guards all that others see; it is never held over meshing, or over a commit.
   mutable absl::Mutex change_mutex_ ABSL_ACQUIRED_BEFORE(mutex_);
   mutable absl::Mutex mutex_;
-  // These have locks of their own. No thread holds change_mutex_ and wants the first.
+  // These have locks of their own. No thread holds change_mutex_ and wants the first or the second.
   SessionLocator locator_;
+  SessionCuts cuts_{kMostCuts};
   mutable MeshDeltas deltas_;
 
   // Never null; written with both locks held, by Make alone.

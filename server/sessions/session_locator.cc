@@ -5,7 +5,6 @@
 #include "core/base/status_macros.h"
 
 namespace wellspace::server {
-namespace {
 
 absl::StatusOr<std::shared_ptr<const LocatedMesh>> MakeLocated(const MeshSnapshot& mesh, Lasts lasts, Job& job) {
   const auto dimension = static_cast<int>(mesh.record().domain_low_size());
@@ -23,43 +22,6 @@ absl::StatusOr<std::shared_ptr<const LocatedMesh>> MakeLocated(const MeshSnapsho
   located->memory = job.TakeMemory(bytes);
   located->memory.MakeLasting(lasts);
   return located;
-}
-
-}  // namespace
-
-absl::StatusOr<std::shared_ptr<const LocatedMesh>> SessionLocator::Prepare(const LastMesh& last_mesh, Lasts lasts,
-                                                                           Job& job) {
-  std::lock_guard making(making_mutex_);
-  // After the wait: there may be another mesh by now.
-  WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<const MeshSnapshot> mesh, last_mesh());
-  std::shared_ptr<const LocatedMesh> before;  // is freed without mutex_, and before another takes memory
-  {
-    std::lock_guard lock(mutex_);
-    if (kept_ != nullptr && kept_->revision == mesh->revision()) {
-      return kept_;
-    }
-    before = std::exchange(kept_, nullptr);
-  }
-  before = nullptr;
-  WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<const LocatedMesh> located, MakeLocated(*mesh, lasts, job));
-  std::lock_guard lock(mutex_);
-  kept_ = located;
-  return located;
-}
-
-bool SessionLocator::Has(uint64_t revision) const {
-  std::lock_guard lock(mutex_);
-  return kept_ != nullptr && kept_->revision == revision;
-}
-
-uint64_t SessionLocator::SpareBytes() const {
-  std::lock_guard lock(mutex_);
-  return IsSpareLocked() ? kept_->memory.bytes() : 0;
-}
-
-std::shared_ptr<const LocatedMesh> SessionLocator::GiveUp() {
-  std::lock_guard lock(mutex_);
-  return IsSpareLocked() ? std::exchange(kept_, nullptr) : nullptr;
 }
 
 }  // namespace wellspace::server

@@ -147,8 +147,10 @@ absl::Status Session::CommitSuccess(Operation& operation, WorkResult& result) {
     bytes_before = work_.mesh == nullptr ? 0 : work_.mesh->loaded_bytes();
     WELLSPACE_RETURN_IF_ERROR(account_.TakeMesh(bytes));
   }
-  // Dropped differences and sizes are freed without the lock.
+  // Dropped differences and sizes are freed without the lock, and products of the mesh before.
   std::vector<MeshDeltas::Delta> deltas;
+  std::vector<SessionLocator::Made> located;
+  std::vector<SessionCuts::Made> cuts;
   SizeSets sizes;
   SessionChange change;
   const auto show = [&] {
@@ -166,6 +168,8 @@ absl::Status Session::CommitSuccess(Operation& operation, WorkResult& result) {
       result.mesh->MakeObsolete();
     }
     deltas = deltas_.Advance(std::move(result.delta), bytes);
+    located = locator_.Drop();
+    cuts = cuts_.Drop();
     result.work.mesh = std::move(result.mesh);
     std::swap(work_, result.work);
     (void)operation.Apply(RecordOfOperation(*state_, operation.number()));

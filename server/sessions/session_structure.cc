@@ -13,6 +13,13 @@
 namespace wellspace::server {
 namespace {
 
+// Whether a cut is one with these options.
+auto IsCutWith(const core::PartitionOptions& options) {
+  return [&options](const MeshCut& cut) {
+    return cut.options.parts == options.parts && cut.options.contiguous == options.contiguous;
+  };
+}
+
 // Reserves memory for `count` more vertices in the mesher of `work`.
 absl::Status ReserveForVertices(uint64_t count, MemoryBudget& memory, SessionWork& work) {
   if (!memory.is_limited()) {
@@ -88,7 +95,7 @@ Session::Size Session::GetSize(uint64_t few) const {
   }
   if (CheckMesh(*state_).ok()) {
     size.vertices = state_->record.mesh().vertices();
-    size.has_locator = locator_.Has(state_->record.mesh().revision());
+    size.has_locator = locator_.Find(state_->record.mesh().revision()) != nullptr;
     // While vertices are added, or points removed, the mesher is theirs, and not looked at.
     const bool is_theirs = occupancy_.busy == Busy::kAddingVertices || occupancy_.busy == Busy::kRemovingPoints;
     size.replayed_steps = !is_theirs && work_.mesher == nullptr ? state_->steps.count() : 0;
@@ -108,7 +115,26 @@ absl::StatusOr<std::shared_ptr<const LocatedMesh>> Session::PrepareLocator(uint6
     }
     return work_.mesh;
   };
-  return locator_.Prepare(mesh, inputs().lasts, job);
+  const Lasts lasts = inputs().lasts;
+  return locator_.Prepare(mesh, [&](const MeshSnapshot& found) { return MakeLocated(found, lasts, job); });
+}
+
+absl::StatusOr<std::shared_ptr<const MeshCut>> Session::PrepareCut(const std::shared_ptr<const MeshSnapshot>& mesh,
+                                                                   const core::PartitionOptions& options, Job& job,
+                                                                   bool* is_at_work) {
+  const auto find = [&]() -> absl::StatusOr<std::shared_ptr<const MeshSnapshot>> {
+    absl::MutexLock lock(&mutex_);
+    WELLSPACE_RETURN_IF_ERROR(CheckOpen(occupancy_, name()));
+    return mesh;
+  };
+  const Lasts lasts = inputs().lasts;
+  return cuts_.Prepare(
+      find, [&](const MeshSnapshot& found) { return CutIntoParts(found, options, lasts, job); }, IsCutWith(options),
+      is_at_work);
+}
+
+bool Session::HasCut(const MeshSnapshot& mesh, const core::PartitionOptions& options) const {
+  return cuts_.Find(mesh.revision(), IsCutWith(options)) != nullptr;
 }
 
 // One AddVertices: its parts, in their order.

@@ -22,6 +22,7 @@ class MemoryMesh final : public MeshSnapshot {
   absl::StatusOr<grpc::ByteBuffer> SerializeChunk(uint64_t index, int field, bool with_boundary) const override;
   absl::StatusOr<core::Mesh> Load(const core::RunContext& context) const override;
   absl::StatusOr<std::shared_ptr<const core::Mesh>> Whole(const core::RunContext& context) const override;
+  absl::StatusOr<uint64_t> WholeBytes() const override { return 0; }
   absl::StatusOr<core::HugeVector<double>> LoadPoints(const core::RunContext& context) const override;
   absl::Status CheckSame(const core::Mesh& made) const override;
 

@@ -21,9 +21,6 @@ using google::protobuf::internal::WireFormatLite;
 // Tags, lengths, index and checksum around the values of a chunk, generously.
 constexpr uint64_t kEnvelopeBytes = 64;
 
-// Chunks that a stream holds a copy of: one that is written, one in the buffers of the connection.
-constexpr uint64_t kChunksOnTheirWay = 2;
-
 // The tag and the length that a field of `size` bytes begins with.
 std::string TagOf(int field, uint64_t size) {
   std::string tag;
@@ -35,18 +32,34 @@ std::string TagOf(int field, uint64_t size) {
   return tag;
 }
 
+// An array of rows of `width` numbers. `bytes_beside`: what comes beside each row.
+template <typename Values>
+MeshArray CutArray(int field, const Values& values, uint64_t width, uint64_t max_bytes, uint64_t bytes_beside = 0) {
+  const uint64_t bytes = std::max(max_bytes, 2 * kEnvelopeBytes) - kEnvelopeBytes;
+  const uint64_t row_bytes = sizeof(values[0]) * width;
+  return {.field = field,
+          .data = values.data(),
+          .row_bytes = row_bytes,
+          .rows = values.size() / width,
+          .rows_per_chunk = bytes / (row_bytes + bytes_beside)};
+}
+
+// The arrays of a part, in the order in which they are sent.
+std::vector<std::pair<int, const core::HugeVector<uint32_t>*>> ArraysOf(const PartArrays& part) {
+  return {{v1::MeshChunk::kVertexIdsFieldNumber, &part.vertex_ids},
+          {v1::MeshChunk::kVertexOwnersFieldNumber, &part.vertex_owners},
+          {v1::MeshChunk::kVertexRowsFieldNumber, &part.vertex_rows},
+          {v1::MeshChunk::kSimplexIdsFieldNumber, &part.simplex_ids},
+          {v1::MeshChunk::kSimplexOwnersFieldNumber, &part.simplex_owners},
+          {v1::MeshChunk::kFacetIdsFieldNumber, &part.facet_ids}};
+}
+
 }  // namespace
 
 std::vector<MeshArray> CutMesh(const core::Mesh& mesh, uint64_t max_bytes) {
-  const uint64_t bytes = std::max(max_bytes, 2 * kEnvelopeBytes) - kEnvelopeBytes;
   std::vector<MeshArray> arrays;
   const auto add = [&](int field, const auto& values, uint64_t width, uint64_t bytes_beside = 0) {
-    const uint64_t row_bytes = sizeof(values[0]) * width;
-    arrays.push_back({.field = field,
-                      .data = values.data(),
-                      .row_bytes = row_bytes,
-                      .rows = values.size() / width,
-                      .rows_per_chunk = bytes / (row_bytes + bytes_beside)});
+    arrays.push_back(CutArray(field, values, width, max_bytes, bytes_beside));
   };
   const uint64_t dimension = mesh.dimension;
   // Beside each point that has moved stands its number.
@@ -65,17 +78,26 @@ std::vector<MeshArray> CutMesh(const core::Mesh& mesh, uint64_t max_bytes) {
 bool IsOfBoundary(int field) {
   return field == v1::MeshChunk::kVertexOriginsFieldNumber || field == v1::MeshChunk::kVertexTagsFieldNumber ||
          field == v1::MeshChunk::kSimplexRegionsFieldNumber || field == v1::MeshChunk::kFacetsFieldNumber ||
-         field == v1::MeshChunk::kRidgesFieldNumber;
+         field == v1::MeshChunk::kRidgesFieldNumber || field == v1::MeshChunk::kFacetIdsFieldNumber;
 }
 
 MeshChunks::MeshChunks(core::Mesh mesh, uint64_t max_bytes)
     : mesh_(std::move(mesh)), arrays_(CutMesh(mesh_, max_bytes)) {}
 
+MeshChunks::MeshChunks(core::Mesh mesh, PartArrays part, uint64_t max_bytes)
+    : mesh_(std::move(mesh)), part_(std::move(part)), arrays_(CutMesh(mesh_, max_bytes)) {
+  for (const auto& [field, values] : ArraysOf(part_)) {
+    arrays_.push_back(CutArray(field, *values, 1, max_bytes));
+  }
+}
+
 uint64_t MeshChunks::memory_bytes() const {
-  const uint64_t indices = mesh_.simplices.capacity() + mesh_.input_vertex.capacity() +
-                           mesh_.moved_vertices.capacity() + mesh_.vertex_origins.capacity() + mesh_.facets.capacity() +
-                           mesh_.ridges.capacity();
-  return kChunksOnTheirWay * kMaxResponseBytes + (mesh_.points.capacity() + mesh_.weights.capacity()) * sizeof(double) +
+  uint64_t indices = mesh_.simplices.capacity() + mesh_.input_vertex.capacity() + mesh_.moved_vertices.capacity() +
+                     mesh_.vertex_origins.capacity() + mesh_.facets.capacity() + mesh_.ridges.capacity();
+  for (const auto& [field, values] : ArraysOf(part_)) {
+    indices += values->capacity();
+  }
+  return kBytesOnTheirWay + (mesh_.points.capacity() + mesh_.weights.capacity()) * sizeof(double) +
          indices * sizeof(uint32_t) +
          (mesh_.vertex_tags.capacity() + mesh_.simplex_regions.capacity()) * sizeof(int32_t);
 }

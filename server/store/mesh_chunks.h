@@ -31,6 +31,16 @@ struct MeshArray {
 // response with a chunk has at most `max_bytes`.
 std::vector<MeshArray> CutMesh(const core::Mesh& mesh, uint64_t max_bytes = kMaxResponseBytes);
 
+// The numbers of the vertices, simplices and facets of a part of a mesh: see v1.MeshChunk.
+struct PartArrays {
+  core::HugeVector<uint32_t> vertex_ids;
+  core::HugeVector<uint32_t> vertex_owners;
+  core::HugeVector<uint32_t> vertex_rows;
+  core::HugeVector<uint32_t> simplex_ids;
+  core::HugeVector<uint32_t> simplex_owners;
+  core::HugeVector<uint32_t> facet_ids;
+};
+
 // Whether only clients that ask for the boundary get this array.
 bool IsOfBoundary(int field);
 
@@ -49,7 +59,12 @@ class MeshChunks {
     std::span<const uint32_t> moved{};  // of the vertices of a chunk of points
   };
 
+  // Memory of chunks that a stream holds a copy of: one that is written, one in the buffers of the connection.
+  static constexpr uint64_t kBytesOnTheirWay = 2 * kMaxResponseBytes;
+
   explicit MeshChunks(core::Mesh mesh, uint64_t max_bytes = kMaxResponseBytes);
+  // Of a part of a larger mesh, whose numbers follow all else.
+  MeshChunks(core::Mesh mesh, PartArrays part, uint64_t max_bytes = kMaxResponseBytes);
 
   // Memory of the mesh, and of chunks on their way, in bytes.
   uint64_t memory_bytes() const;
@@ -65,6 +80,7 @@ class MeshChunks {
  private:
   MemoryReservation memory_;
   core::Mesh mesh_;
+  PartArrays part_;
   std::vector<MeshArray> arrays_;  // in the order in which they are sent
 };
 

@@ -255,6 +255,19 @@ absl::StatusOr<core::Mesh> MeshFile::Load(const core::RunContext& context) const
 }
 
 absl::StatusOr<std::shared_ptr<const core::Mesh>> MeshFile::Whole(const core::RunContext& context) const {
+  {
+    const std::lock_guard lock(mutex_);
+    if (std::shared_ptr<const core::Mesh> whole = whole_.lock(); whole != nullptr) {
+      return whole;
+    }
+  }
+  WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<const core::Mesh> whole, LoadWhole(context));
+  const std::lock_guard lock(mutex_);
+  whole_ = whole;
+  return whole;
+}
+
+absl::StatusOr<std::shared_ptr<const core::Mesh>> MeshFile::LoadWhole(const core::RunContext& context) const {
   using Chunk = v1::MeshChunk;
   WELLSPACE_ASSIGN_OR_RETURN(core::Mesh loaded, Load(context));
   auto mesh = std::make_shared<core::Mesh>(std::move(loaded));
@@ -275,6 +288,15 @@ absl::StatusOr<std::shared_ptr<const core::Mesh>> MeshFile::Whole(const core::Ru
     mesh->regions.push_back({.id = region.id(), .name = region.name()});
   }
   return std::shared_ptr<const core::Mesh>(std::move(mesh));
+}
+
+absl::StatusOr<uint64_t> MeshFile::WholeBytes() const {
+  WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<const Directory> whole, directory());
+  uint64_t bytes = 0;
+  for (const Array& array : whole->arrays()) {
+    bytes += array.rows() * array.row_bytes();
+  }
+  return bytes;
 }
 
 absl::StatusOr<core::HugeVector<double>> MeshFile::LoadPoints(const core::RunContext& context) const {

@@ -45,6 +45,7 @@ class MeshFile final : public MeshSnapshot {
   absl::StatusOr<grpc::ByteBuffer> SerializeChunk(uint64_t index, int field, bool with_boundary) const override;
   absl::StatusOr<core::Mesh> Load(const core::RunContext& context) const override;
   absl::StatusOr<std::shared_ptr<const core::Mesh>> Whole(const core::RunContext& context) const override;
+  absl::StatusOr<uint64_t> WholeBytes() const override;
   absl::StatusOr<core::HugeVector<double>> LoadPoints(const core::RunContext& context) const override;
   absl::Status CheckSame(const core::Mesh& made) const override;
 
@@ -64,6 +65,7 @@ class MeshFile final : public MeshSnapshot {
   absl::StatusOr<std::shared_ptr<const Directory>> directory() const;
   absl::StatusOr<std::shared_ptr<const Directory>> ReadDirectory() const;
   absl::Status CheckDirectory(const Directory& directory, uint64_t size) const;
+  absl::StatusOr<std::shared_ptr<const core::Mesh>> LoadWhole(const core::RunContext& context) const;
   // Reads `bytes` from the place `offset`, all of them.
   absl::Status ReadAll(const File& file, uint64_t offset, std::span<char> bytes) const;
   // Reads a chunk, of `size` bytes, and checks it.
@@ -79,7 +81,9 @@ class MeshFile final : public MeshSnapshot {
   const std::shared_ptr<ChunkBuffers> buffers_;
   MemoryReservation memory_;
   mutable std::mutex mutex_;
-  mutable std::shared_ptr<const Directory> directory_;  // guarded by mutex_
+  // Guarded by mutex_.
+  mutable std::shared_ptr<const Directory> directory_;
+  mutable std::weak_ptr<const core::Mesh> whole_;  // as long as those live who have asked for it
 };
 
 }  // namespace wellspace::server

@@ -70,6 +70,8 @@ class MeshSnapshot {
   //
   // Errors:     CANCELLED, DEADLINE_EXCEEDED.
   virtual absl::StatusOr<std::shared_ptr<const core::Mesh>> Whole(const core::RunContext& context) const = 0;
+  // Memory of that, in bytes; 0 where it is this one's own.
+  virtual absl::StatusOr<uint64_t> WholeBytes() const = 0;
 
   // A copy of its points: vertices x dimension, row-major.
   //

@@ -54,6 +54,10 @@ class MockConnection : public Connection {
   MOCK_METHOD(absl::Status, DownloadMesh,
               (const std::string&, MeshSink&, std::optional<uint64_t>, const OnChunks&, const CallOptions&),
               (override));
+  MOCK_METHOD(absl::Status, DownloadPart,
+              (const std::string&, const PartOptions&, MeshSink&, std::optional<uint64_t>, const OnChunks&,
+               const CallOptions&),
+              (override));
   MOCK_METHOD(absl::Status, UpdateMesh, (const std::string&, Mesh&, const OnChunks&, const CallOptions&), (override));
   MOCK_METHOD(absl::StatusOr<Operation>, StartRefinement,
               (const std::string&, const RefinementOptions&, const CallOptions&), (override));
@@ -103,6 +107,18 @@ TEST(Client, PassesMeshingToItsConnection) {
   EXPECT_EQ(client.EstimateMesh(options, points, call).status(), E("estimate"));
   EXPECT_EQ(client.GetServerInfo(call).status(), E("info"));
   EXPECT_EQ(client.CheckHealth("a", call).status(), E("health"));
+}
+
+TEST(Client, PassesAPartToItsConnection) {
+  auto connection = std::make_shared<MockConnection>();
+  Client client(connection);
+  const PartOptions part{.parts = 8, .part = 7};
+  MeshCollector sink;
+  const CallOptions call = {.timeout = absl::Seconds(3), .stop = {}, .request_id = ""};
+  EXPECT_CALL(*connection, DownloadPart("s", part, ::testing::Ref(sink), std::optional<uint64_t>(6), _,
+                                        Field(&CallOptions::timeout, absl::Seconds(3))))
+      .WillOnce(Return(E("part")));
+  EXPECT_EQ(client.DownloadPart("s", part, sink, 6, nullptr, call), E("part"));
 }
 
 TEST(Client, PassesSessionsAndOperationsToItsConnection) {

@@ -1,4 +1,5 @@
-"""Parts of meshes: they add up to the mesh; Gmsh and VTK read them; a parallel solver gets the solution of one rank.
+"""Parts of meshes, from files and from sessions: they add up to the mesh; Gmsh and VTK read them; a parallel solver gets
+the solution of one rank.
 
 Wants gmsh, python3-gmsh and python3-vtk9, and python3-mpi4py and python3-petsc4py, as deploy/install-deps.sh installs
 them for interoperability and solvers; what is not installed is skipped.
@@ -14,7 +15,7 @@ import unittest
 
 import numpy
 
-from wellspaced import BIN, ROOT
+from wellspaced import BIN, ROOT, Wellspaced
 
 
 def has_module(name):
@@ -41,12 +42,23 @@ class Parts(unittest.TestCase):
         assert done.returncode == code, done.stderr
         return done.stdout if code == 0 else done.stderr
 
-    def run_python(self, script, *arguments, ranks=0):
+    @classmethod
+    def session(cls):
+        """A server, and a session with the mesh of the cow."""
+        server = Wellspaced()
+        cls.addClassCleanup(server.kill)
+        remote = ("--server", server.address)
+        name = cls.wellspace("session", "create", *remote, "--dimension", 3).strip()
+        cls.wellspace("upload", name, ROOT / "examples" / "spot.csv", *remote, "--quiet")
+        cls.wellspace("refine", name, *remote, "--quiet")
+        return remote, name
+
+    def run_python(self, script, *arguments, ranks=0, server=""):
         mpi = ["mpiexec", "--oversubscribe", "-n", str(ranks)] if ranks > 0 else []
         result = subprocess.run([*mpi, sys.executable, *(["-c"] if "\n" in str(script) else []), str(script),
                                  *map(str, arguments)], cwd=self.folder, text=True, timeout=240,
                                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                                env=os.environ | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+                                env=os.environ | {"WELLSPACE_SERVER": server, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
                                                   "OMP_NUM_THREADS": "1"})
         self.assertEqual(result.returncode, 0, result.stdout)
         return result.stdout
@@ -82,6 +94,13 @@ class Parts(unittest.TestCase):
                                          numpy.arange(len(rows)))
 
     def test_what_cannot_be_is_refused(self):
+        for options, words in ((("--parts", 2, "-o", "p.su2"), "parts are written to"),
+                               (("--parts", 0, "-o", "p.npz"), "--parts"), (("--ghost-layers", 1, "-o", "p.npz"), "--parts"),
+                               (("--parts", 2, "-o", "p.npz", "--order", 2), "--order and --parts"),
+                               (("--parts", 2, "-o", "p.npz", "--no-boundary"), "--no-boundary and --parts"),
+                               (("--parts", 2, "-o", "p.vtu", "--format", "vtu"), "--format and --parts"),
+                               (("--parts", 10**6, "-o", "p.npz"), "parts: 1000000 parts of a mesh of")):
+            self.assertIn(words, self.wellspace("mesh", ROOT / "examples" / "swarm.csv", *options, code=2))
         for arguments, words in (((0, "p.npz"), "--parts"), ((2, "p.su2"), "--out p.su2: parts are written to"),
                                  ((10**6, "p.npz"), "parts: 1000000 parts of a mesh of"),
                                  ((2, "mesh.msh"), "MESH")):
@@ -132,15 +151,58 @@ print(json.dumps([reader.GetOutput().GetNumberOfCells(), int((ghosts != 0).sum()
         self.assertEqual(cells, own + ghosts)
         self.assertEqual(ids, list(range(own)))
 
+    def test_a_mesh_in_parts_is_that_of_its_file(self):
+        """To the byte: `mesh --parts` writes what `partition` writes of the mesh."""
+        for output in ("direct.npz", "direct.msh", "direct.pvtu"):
+            self.wellspace("mesh", ROOT / "examples" / "spot.csv", "-o", output, "--parts", 3, "--quiet")
+            self.wellspace("partition", "mesh.npz", "-n", 3, "-o", f"of_{output}")
+            written = [path.name for path in self.folder.iterdir() if path.name.startswith("direct")
+                       and path.suffix in (pathlib.Path(output).suffix, ".vtu")]
+            self.assertGreaterEqual(len(written), 1)
+            for name in written:
+                direct, other = ((self.folder / path).read_bytes() for path in (name, f"of_{name}"))
+                self.assertEqual(direct.replace(b"direct_", b"of_direct_"), other, name)
+            for path in self.folder.glob("*direct*"):
+                path.unlink()
+
+    def test_the_tool_downloads_parts(self):
+        remote, name = self.session()
+        self.wellspace("download", name, "-o", "whole.npz", *remote, "--quiet")
+        self.wellspace("partition", "whole.npz", "-n", 3, "--ghost-layers", 2, "-o", "cut.npz")
+        for number in range(3):
+            figures = json.loads(self.wellspace("download", name, "--parts", 3, "--part", number, "--ghost-layers", 2,
+                                                "-o", "got.npz", *remote, "--output", "json"))
+            got, cut = numpy.load(self.folder / "got.npz"), numpy.load(self.folder / f"cut_{number}.npz")
+            self.assertEqual(set(got.files), set(cut.files))
+            for array in cut.files:
+                numpy.testing.assert_array_equal(got[array], cut[array])
+            self.assertEqual(figures["own_vertices"], int(cut["part"][2]))
+        self.assertIn("part 2 of 3", self.run_tool_for_notes("download", name, "--parts", 3, "--part", 2, "-o", "got.vtu",
+                                                             *remote))
+        for options, words in ((("--parts", 2, "-o", "p.npz"), "--part"), (("--part", 2, "-o", "p.npz"), "--parts"),
+                               (("--parts", 2, "--part", 2, "-o", "p.npz"), "the last is 1"),
+                               (("--parts", 2, "--part", 1, "-o", "p.msh"), "a part is written to .vtu or .npz"),
+                               (("--parts", 2, "--part", 1, "-o", "p.npz", "--ghost-layers", 17), "0 to 16"),
+                               (("--parts", 2, "--part", 1, "-o", "p.npz", "--no-boundary"), "--no-boundary"),
+                               (("--parts", 10**6, "--part", 1, "-o", "p.npz"), "each part has at least one")):
+            self.assertIn(words, self.wellspace("download", name, *options, *remote, code=2))
+
+    def run_tool_for_notes(self, *arguments):
+        done = subprocess.run([BIN / "wellspace", *map(str, arguments)], cwd=self.folder, timeout=120, text=True,
+                              capture_output=True, check=True)
+        return done.stderr
+
     @unittest.skipUnless(has_module("petsc4py") and has_module("mpi4py") and shutil.which("mpiexec"),
                          "python3-petsc4py or python3-mpi4py is not installed")
     def test_ranks_solve_what_one_solves(self):
+        (_, server), session = self.session()
         solutions = []
         for ranks in (1, 2, 4):
             self.wellspace("partition", "mesh.npz", "-n", ranks, "-o", f"ranks{ranks}.npz")
-            self.run_python(ROOT / "examples" / "poisson" / "parallel_poisson.py", f"ranks{ranks}", f"u{ranks}.npy",
-                            ranks=ranks)
-            solutions.append(numpy.load(self.folder / f"u{ranks}.npy"))
+            for mesh in (session, f"ranks{ranks}"):
+                self.run_python(ROOT / "examples" / "poisson" / "parallel_poisson.py", mesh, f"u{ranks}.npy",
+                                ranks=ranks, server=server)
+                solutions.append(numpy.load(self.folder / f"u{ranks}.npy"))
         self.assertGreater(solutions[0].max(), 0)
         for solution in solutions[1:]:
             self.assertLessEqual(abs(solution - solutions[0]).max(), 1e-10 * solutions[0].max())

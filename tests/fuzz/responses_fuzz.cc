@@ -198,6 +198,22 @@ class SinkCheck final : public client::MeshSink {
   uint64_t input_vertices_ = 0;
 };
 
+// A part has as many numbers as vertices and simplices, and owns what it says.
+void RequirePart(const client::Mesh& mesh) {
+  Require(mesh.part.has_value() && mesh.part->part == 1 && mesh.part->parts == 2, "it is the part that is wanted");
+  const client::MeshPart& part = *mesh.part;
+  const size_t vertices = mesh.points.size() / mesh.dimension;
+  const size_t simplices = mesh.simplices.size() / (mesh.dimension + 1);
+  Require(part.vertex_ids.size() == vertices && part.vertex_owners.size() == vertices &&
+              part.vertex_rows.size() == vertices && part.simplex_ids.size() == simplices &&
+              part.simplex_owners.size() == simplices && part.facet_ids.size() == mesh.facets.size() / mesh.dimension,
+          "a part has all its numbers");
+  Require(part.own_vertex_count <= vertices && part.own_simplex_count <= simplices, "it owns what it has");
+  Require(std::count(part.vertex_owners.begin(), part.vertex_owners.end(), 1u) ==
+              static_cast<ptrdiff_t>(part.own_vertex_count),
+          "owners are as it says");
+}
+
 // Each point is in a simplex of vertices that there are, or in none.
 absl::Status RequirePlaces(const absl::StatusOr<client::Located>& located) {
   if (!located.ok()) {
@@ -349,10 +365,19 @@ constexpr std::array kCalls = {
       surface.seeds = {{.x = 1, .y = 2, .z = 3, .is_hole = true, .region = 0, .max_volume = {}}};
       return c.AddTriangles(kSession, surface, std::nullopt, Patience()).status();
     }},
+    Call{[](client::Connection& c) {
+      client::MeshCollector collector;
+      absl::Status status = c.DownloadPart(kSession, {.parts = 2, .part = 1}, collector, 0, nullptr, Patience());
+      if (status.ok()) {
+        RequirePart(collector.mesh());
+      }
+      return status;
+    }},
 };
 
 constexpr size_t kMeshPoints = 0;
 constexpr size_t kDownloadMesh = 10;
+constexpr size_t kDownloadPart = kCalls.size() - 1;
 
 template <typename Response>
 std::string WithChecksum(std::string bytes) {
@@ -364,9 +389,14 @@ std::string WithChecksum(std::string bytes) {
   const auto checksum = [](const auto& values) {
     return Crc32c(values.data(), values.size() * sizeof(*values.data()));
   };
-  chunk.set_crc32c(!chunk.points().empty()      ? checksum(chunk.points())
-                   : !chunk.simplices().empty() ? checksum(chunk.simplices())
-                                                : checksum(chunk.input_vertices()));
+  chunk.set_crc32c(!chunk.points().empty()           ? checksum(chunk.points())
+                   : !chunk.simplices().empty()      ? checksum(chunk.simplices())
+                   : !chunk.vertex_ids().empty()     ? checksum(chunk.vertex_ids())
+                   : !chunk.vertex_owners().empty()  ? checksum(chunk.vertex_owners())
+                   : !chunk.vertex_rows().empty()    ? checksum(chunk.vertex_rows())
+                   : !chunk.simplex_ids().empty()    ? checksum(chunk.simplex_ids())
+                   : !chunk.simplex_owners().empty() ? checksum(chunk.simplex_owners())
+                                                     : checksum(chunk.input_vertices()));
   return response.SerializeAsString();
 }
 
@@ -383,7 +413,7 @@ std::deque<Step> ReadSteps(ByteReader& bytes, size_t call) {
     } else {
       if (call == kMeshPoints) {
         block = WithChecksum<v1::MeshPointsResponse>(std::move(block));
-      } else if (call == kDownloadMesh) {
+      } else if (call == kDownloadMesh || call == kDownloadPart) {
         block = WithChecksum<v1::DownloadMeshResponse>(std::move(block));
       }
       const grpc::Slice slice(block);

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -12,6 +13,7 @@
 #include "client/cli/domain_options.h"
 #include "client/cli/meshing_options.h"
 #include "client/cli/options.h"
+#include "client/cli/part_files.h"
 #include "client/cli/part_name_options.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/remote_command.h"
@@ -23,12 +25,19 @@
 #include "client/formats/file_plan.h"
 #include "client/formats/io/input_file.h"
 #include "client/formats/io/line_reader.h"
+#include "client/formats/registry.h"
+#include "client/formats/write_mesh.h"
 #include "client/json/statistics.h"
+#include "client/mesh_sink.h"
 #include "client/point_source.h"
 #include "core/base/status_macros.h"
+#include "core/partition/partition.h"
 
 namespace wellspace::cli {
 namespace {
+
+// What servers take; more would be nearly the whole mesh.
+constexpr uint32_t kMostDownloadedLayers = 16;
 
 struct UploadCommand {
   RemoteCommand remote;
@@ -264,16 +273,45 @@ struct DownloadCommand {
   std::string session;
   MeshOutput output;
   std::optional<uint64_t> revision;
+  PartitionOptions partition;
+  std::optional<uint32_t> part;  // of partition.parts; none: the whole mesh
 
   absl::Status Check() const;
+  absl::Status CheckPart() const;
   absl::Status Download(client::Client& client, const client::CallOptions& call) const;
+  absl::Status DownloadPart(client::Client& client, const client::CallOptions& call) const;
+  // Shows how far the download is.
+  client::OnChunks Showing(ProgressBar& bar) const;
 };
+
+absl::Status DownloadCommand::CheckPart() const {
+  if (partition.ghost_layers > kMostDownloadedLayers) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("--ghost-layers ", partition.ghost_layers, ": a server has 0 to ", kMostDownloadedLayers));
+  }
+  if (*part >= partition.parts) {
+    return absl::InvalidArgumentError(absl::StrCat("--part ", *part, ": of --parts ", partition.parts,
+                                                   ", which are numbered from 0, the last is ", partition.parts - 1));
+  }
+  const std::string extension =
+      output.format.empty() ? formats::ExtensionOf(output.path) : formats::ExtensionOfMesh(output.format);
+  if (extension != ".vtu" && extension != ".npz") {
+    return absl::InvalidArgumentError(
+        absl::StrCat("--out ", output.path, ": a part is written to .vtu or .npz, which have its numbers"));
+  }
+  return output.order == formats::MeshOrder::kFirst && !output.no_boundary
+             ? absl::OkStatus()
+             : absl::InvalidArgumentError("--order or --no-boundary, and --part: a part is whole, of the first order");
+}
 
 absl::Status DownloadCommand::Check() const {
   if (remote.json() && output.path == formats::kStandardStream) {
     return absl::InvalidArgumentError("--output json and --out: only one of them can be standard output");
   }
   WELLSPACE_RETURN_IF_ERROR(output.Check());
+  if (part.has_value()) {
+    WELLSPACE_RETURN_IF_ERROR(CheckPart());
+  }
   formats::FilePlan files;
   remote.AddFilesTo(files);
   files.WritesMesh("--out", output.path, output.format);
@@ -281,6 +319,57 @@ absl::Status DownloadCommand::Check() const {
     files.Writes("--output json", std::string(formats::kStandardStream));
   }
   return files.Check();
+}
+
+client::OnChunks DownloadCommand::Showing(ProgressBar& bar) const {
+  return [&bar](uint64_t done, uint64_t total) {
+    bar.Update("download", total == 0 ? 1 : static_cast<double>(done) / total,
+               absl::StrCat(done, " of ", total, " chunks"));
+  };
+}
+
+absl::Status DownloadCommand::DownloadPart(client::Client& client, const client::CallOptions& call) const {
+  client::MeshCollector collector;
+  {
+    ProgressBar bar(!remote.quiet() && !remote.json());
+    const client::PartOptions wanted{.parts = partition.parts,
+                                     .part = *part,
+                                     .ghost_layers = partition.ghost_layers,
+                                     .contiguous = partition.contiguous};
+    WELLSPACE_RETURN_IF_ERROR(client.DownloadPart(session, wanted, collector, revision, Showing(bar), call));
+  }
+  std::vector<std::string> notes;
+  WELLSPACE_RETURN_IF_ERROR(
+      client::WritePart(std::move(collector.mesh()), output.path, output.format, call.stop, &notes));
+  const client::MeshHeader& header = collector.header();
+  const client::PartHeader& of_whole = *header.part;
+  if (remote.json()) {
+    Json json = {{"session", session},
+                 {"revision", header.revision},
+                 {"parts", of_whole.parts},
+                 {"part", of_whole.part},
+                 {"vertices", header.vertex_count},
+                 {"own_vertices", of_whole.own_vertex_count},
+                 {"simplices", header.simplex_count},
+                 {"own_simplices", of_whole.own_simplex_count},
+                 {"facets", header.facet_count},
+                 {"whole_vertices", of_whole.whole_vertex_count},
+                 {"whole_simplices", of_whole.whole_simplex_count},
+                 {"whole_facets", of_whole.whole_facet_count},
+                 {"notes", notes}};
+    PrintJson(json);
+    return absl::OkStatus();
+  }
+  if (!remote.quiet()) {
+    std::cerr << "part " << of_whole.part << " of " << of_whole.parts << ": "
+              << WithThousands(of_whole.own_vertex_count) << " of " << WithThousands(of_whole.whole_vertex_count)
+              << " vertices, " << WithThousands(of_whole.own_simplex_count) << " of "
+              << WithThousands(of_whole.whole_simplex_count) << " " << formats::SimplexName(header.dimension) << ", "
+              << WithThousands(header.simplex_count - of_whole.own_simplex_count) << " ghosts -> " << output.path
+              << "\n";
+  }
+  PrintNotes({.notes = notes}, remote.format(), remote.quiet());
+  return absl::OkStatus();
 }
 
 absl::Status DownloadCommand::Download(client::Client& client, const client::CallOptions& call) const {
@@ -294,16 +383,7 @@ absl::Status DownloadCommand::Download(client::Client& client, const client::Cal
   }
   {
     ProgressBar bar(!remote.quiet() && !remote.json());
-    const absl::Status status = client.DownloadMesh(
-        session, file, revision,
-        [&bar](uint64_t done, uint64_t total) {
-          bar.Update("download", total == 0 ? 1 : static_cast<double>(done) / total,
-                     absl::StrCat(done, " of ", total, " chunks"));
-        },
-        call);
-    if (!status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(client.DownloadMesh(session, file, revision, Showing(bar), call));
   }
   if (remote.json()) {
     std::cout << WithNotes(
@@ -373,14 +453,30 @@ void AddDownload(CLI::App& app, int& exit_code) {
   AddCount(
       *download, "--revision", [command](uint64_t revision) { command->revision = revision; },
       "Fail unless the mesh is of this revision; default: the last", 1);
+  CLI::Option* const parts = AddCount(
+      *download, "--parts", [command](uint64_t count) { command->partition.parts = static_cast<uint32_t>(count); },
+      "Of a solver on so many ranks: the server cuts the mesh into as many parts, once for all", 1, core::kMaxParts);
+  CLI::Option* const part = AddCount(
+      *download, "--part", [command](uint64_t number) { command->part = static_cast<uint32_t>(number); },
+      "The part that is written, from 0 on, to a .vtu or .npz, with its numbers in the whole mesh, who owns them, and "
+      "the rows of a solver",
+      0, core::kMaxParts - 1);
+  parts->needs(part);
+  part->needs(parts);
+  command->partition.AddTo(*download);
+  for (const char* const option : {"--ghost-layers", "--contiguous"}) {
+    download->get_option(option)->needs(part);
+  }
   command->remote.AddTo(*download, RemoteCommand::Needs::kLastingServer);
   download->callback([command, &exit_code] {
     if (const absl::Status status = command->Check(); !status.ok()) {
       exit_code = ReportError(status, command->remote.format());
       return;
     }
-    exit_code = command->remote.Run([&command](client::Client& client, const client::CallOptions& call,
-                                               const Interrupt&) { return command->Download(client, call); });
+    exit_code =
+        command->remote.Run([&command](client::Client& client, const client::CallOptions& call, const Interrupt&) {
+          return command->part.has_value() ? command->DownloadPart(client, call) : command->Download(client, call);
+        });
   });
 }
 

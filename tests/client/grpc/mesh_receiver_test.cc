@@ -137,9 +137,9 @@ Answer AnswerWithBoundary() {
 
 constexpr MeshReceiver::Expectation kOnePointIn2D = {.dimension = 2, .input_points = 1};
 
-absl::StatusOr<Mesh> Assemble(const Answer& answer) {
+absl::StatusOr<Mesh> Assemble(const Answer& answer, const MeshReceiver::Expectation& expectation = kOnePointIn2D) {
   MeshCollector collector;
-  MeshReceiver receiver(collector, kOnePointIn2D);
+  MeshReceiver receiver(collector, expectation);
   if (absl::Status status = receiver.SetMetadata(answer.metadata); !status.ok()) {
     return status;
   }
@@ -417,7 +417,7 @@ TEST(MeshReceiver, ContinuesWhereTheStreamBrokeOff) {
   ASSERT_TRUE(whole.ok());
   for (size_t broken_at = 0; broken_at <= answer.chunks.size(); ++broken_at) {
     MeshCollector collector;
-    MeshReceiver receiver(collector, {.dimension = std::nullopt, .input_points = std::nullopt});
+    MeshReceiver receiver(collector, {});
     ASSERT_TRUE(receiver.SetMetadata(answer.metadata).ok());
     for (size_t i = 0; i < broken_at; ++i) {
       ASSERT_TRUE(receiver.AddChunk(answer.chunks[i]).ok());
@@ -434,6 +434,98 @@ TEST(MeshReceiver, ContinuesWhereTheStreamBrokeOff) {
     EXPECT_EQ(collector.mesh().simplices, whole->simplices);
     EXPECT_EQ(collector.mesh().input_vertex, whole->input_vertex);
   }
+}
+
+// The square as part 0 of 2, which owns the first triangle and its vertices; the second is a ghost.
+Answer PartAnswer() {
+  Answer answer = GoodAnswer();
+  v1::MeshMetadata& metadata = answer.metadata;
+  metadata.set_input_point_count(0);
+  metadata.set_chunk_count(8);
+  v1::MeshPartInfo& part = *metadata.mutable_part();
+  part.set_parts(2);
+  part.set_own_vertex_count(3);
+  part.set_own_simplex_count(1);
+  part.set_whole_vertex_count(9);
+  part.set_whole_simplex_count(5);
+  answer.chunks.resize(8);
+  answer.chunks[3].Clear();
+  const auto fill = [&answer](int chunk, google::protobuf::RepeatedField<uint32_t>* (v1::MeshChunk::*field)(),
+                              const std::vector<uint32_t>& values) {
+    (answer.chunks[chunk].*field)()->Assign(values.begin(), values.end());
+    answer.chunks[chunk].set_crc32c(Crc32c(values.data(), values.size() * sizeof(uint32_t)));
+    answer.chunks[chunk].set_index(chunk);
+  };
+  fill(3, &v1::MeshChunk::mutable_vertex_ids, {0, 1, 2, 8});
+  fill(4, &v1::MeshChunk::mutable_vertex_owners, {0, 0, 0, 1});
+  fill(5, &v1::MeshChunk::mutable_vertex_rows, {0, 1, 2, 3});
+  fill(6, &v1::MeshChunk::mutable_simplex_ids, {0, 4});
+  fill(7, &v1::MeshChunk::mutable_simplex_owners, {0, 1});
+  return answer;
+}
+
+absl::StatusOr<Mesh> AssemblePart(const Answer& answer, const PartOptions& wanted = {.parts = 2, .part = 0}) {
+  return Assemble(answer, {.part = wanted});
+}
+
+TEST(MeshReceiver, AssemblesAPart) {
+  const absl::StatusOr<Mesh> mesh = AssemblePart(PartAnswer());
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  ASSERT_TRUE(mesh->part.has_value());
+  EXPECT_EQ(mesh->part->parts, 2u);
+  EXPECT_EQ(mesh->part->own_vertex_count, 3u);
+  EXPECT_EQ(mesh->part->whole_simplex_count, 5u);
+  EXPECT_THAT(mesh->part->vertex_ids, ElementsAre(0, 1, 2, 8));
+  EXPECT_THAT(mesh->part->vertex_owners, ElementsAre(0, 0, 0, 1));
+  EXPECT_THAT(mesh->part->vertex_rows, ElementsAre(0, 1, 2, 3));
+  EXPECT_THAT(mesh->part->simplex_ids, ElementsAre(0, 4));
+  EXPECT_THAT(mesh->part->simplex_owners, ElementsAre(0, 1));
+  EXPECT_TRUE(mesh->part->facet_ids.empty());
+  EXPECT_FALSE(Assemble(GoodAnswer())->part.has_value());
+}
+
+TEST(MeshReceiver, RefusesAnotherPartAndNumbersThatCannotBe) {
+  EXPECT_EQ(AssemblePart(GoodAnswer()).status().code(), absl::StatusCode::kUnimplemented);
+  const auto message_of = [](const std::function<void(Answer&)>& damage) {
+    Answer answer = PartAnswer();
+    damage(answer);
+    const absl::Status status = AssemblePart(answer).status();
+    EXPECT_EQ(status.code(), absl::StatusCode::kDataLoss);
+    return std::string(status.message());
+  };
+  const auto sign = [](v1::MeshChunk& chunk, const google::protobuf::RepeatedField<uint32_t>& values) {
+    chunk.set_crc32c(Crc32c(values.data(), values.size() * sizeof(uint32_t)));
+  };
+  EXPECT_THAT(std::string(Assemble(PartAnswer(), {}).status().message()), HasSubstr("which was not asked for"));
+  EXPECT_THAT(message_of([](Answer& a) { a.metadata.mutable_part()->set_part(1); }), HasSubstr("not asked for"));
+  EXPECT_THAT(message_of([](Answer& a) { a.metadata.mutable_part()->set_parts(3); }), HasSubstr("not asked for"));
+  EXPECT_THAT(message_of([](Answer& a) { a.metadata.mutable_part()->set_own_vertex_count(5); }), HasSubstr("owns 5"));
+  EXPECT_THAT(message_of([](Answer& a) { a.metadata.mutable_part()->set_own_simplex_count(kHuge); }),
+              HasSubstr("of the whole mesh"));
+  EXPECT_THAT(message_of([](Answer& a) { a.metadata.mutable_part()->set_whole_vertex_count(3); }), HasSubstr("of 3,"));
+  EXPECT_THAT(message_of([](Answer& a) { a.metadata.mutable_part()->set_whole_simplex_count(kHuge); }),
+              HasSubstr("of the whole mesh"));
+  EXPECT_THAT(message_of([&](Answer& a) {
+                a.chunks[3].set_vertex_ids(3, 9);
+                sign(a.chunks[3], a.chunks[3].vertex_ids());
+              }),
+              HasSubstr("names the number 9 of 9"));
+  EXPECT_THAT(message_of([&](Answer& a) {
+                a.chunks[4].set_vertex_owners(3, 0);
+                sign(a.chunks[4], a.chunks[4].vertex_owners());
+              }),
+              HasSubstr("has the owner 0"));
+  EXPECT_THAT(message_of([&](Answer& a) {
+                a.chunks[7].set_simplex_owners(1, 2);
+                sign(a.chunks[7], a.chunks[7].simplex_owners());
+              }),
+              HasSubstr("has the owner 2"));
+  EXPECT_THAT(message_of([](Answer& a) { a.chunks[6].set_simplex_ids(0, 1); }), HasSubstr("CRC32C"));
+  EXPECT_THAT(message_of([](Answer& a) {
+                a.chunks.pop_back();
+                a.metadata.set_chunk_count(7);
+              }),
+              HasSubstr("0 of 2 simplex owners"));
 }
 
 TEST(MeshReceiver, RefusesToContinueAnotherMesh) {

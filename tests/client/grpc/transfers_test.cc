@@ -330,6 +330,52 @@ class FakeMesh {
   FakeServer& server_;
 };
 
+// The mesh as the only part of itself, in whose middle the connection breaks.
+TEST(Download, OfAPartAsksForItAndGoesOn) {
+  FakeServer server;
+  FakeMesh mesh(server);
+  mesh.metadata.set_input_point_count(0);
+  v1::MeshPartInfo& info = *mesh.metadata.mutable_part();
+  info.set_parts(1);
+  info.set_own_vertex_count(4);
+  info.set_own_simplex_count(2);
+  info.set_whole_vertex_count(4);
+  info.set_whole_simplex_count(2);
+  mesh.metadata.set_chunk_count(8);
+  mesh.metadata.set_revision(5);
+  mesh.chunks.resize(8);
+  mesh.chunks[3].clear_input_vertices();
+  const std::vector<uint32_t> numbers = {0, 1, 2, 3};
+  const std::vector<uint32_t> owners = {0, 0, 0, 0};
+  const auto fill = [&mesh](int chunk, google::protobuf::RepeatedField<uint32_t>& field, std::vector<uint32_t> values,
+                            int count) {
+    field.Assign(values.begin(), values.begin() + count);
+    mesh.chunks[chunk].set_crc32c(Crc32c(values.data(), count * sizeof(uint32_t)));
+    mesh.chunks[chunk].set_index(chunk);
+  };
+  fill(3, *mesh.chunks[3].mutable_vertex_ids(), numbers, 4);
+  fill(4, *mesh.chunks[4].mutable_vertex_owners(), owners, 4);
+  fill(5, *mesh.chunks[5].mutable_vertex_rows(), numbers, 4);
+  fill(6, *mesh.chunks[6].mutable_simplex_ids(), numbers, 2);
+  fill(7, *mesh.chunks[7].mutable_simplex_owners(), owners, 2);
+  mesh.breaks_before = 5;
+  MeshCollector sink;
+  const absl::Status status =
+      server.Client().DownloadPart(kSession, {.parts = 1, .part = 0, .ghost_layers = 3, .contiguous = true}, sink);
+  ASSERT_TRUE(status.ok()) << status;
+  EXPECT_EQ(sink.mesh().part->vertex_ids, numbers);
+  EXPECT_THAT(sink.mesh().part->simplex_owners, ElementsAre(0, 0));
+  ASSERT_GE(mesh.requests.size(), 2u);
+  for (const v1::DownloadMeshRequest& request : mesh.requests) {
+    EXPECT_EQ(request.partition().parts(), 1u);
+    EXPECT_EQ(request.partition().ghost_layers(), 3u);
+    EXPECT_TRUE(request.partition().contiguous() && request.with_boundary());
+  }
+  EXPECT_FALSE(mesh.requests[0].has_revision());
+  EXPECT_EQ(mesh.requests[1].revision(), 5u);
+  EXPECT_EQ(mesh.requests[1].next_chunk(), 5u);
+}
+
 TEST(Download, ReturnsTheMesh) {
   FakeServer server;
   FakeMesh mesh(server);

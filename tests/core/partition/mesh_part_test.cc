@@ -172,6 +172,35 @@ INSTANTIATE_TEST_SUITE_P(Meshes, MeshPartTest,
                          testing::Values(Case{2, 6, 3, 0}, Case{2, 6, 5, 1}, Case{2, 9, 4, 2}, Case{3, 4, 3, 0},
                                          Case{3, 4, 6, 1}, Case{3, 3, 2, 9}, Case{4, 2, 3, 1}));
 
+TEST(MeshPartTest, CountsInRuns) {
+  EXPECT_THAT(CountInRuns(std::vector<uint64_t>{2, 0, 3, 1}, std::vector<uint32_t>{0, 1, 3, 4, 5}),
+              testing::ElementsAre(2, 0, 2, 1));
+  EXPECT_THAT(CountInRuns(std::vector<uint64_t>{2, 3}, {}), testing::ElementsAre(0, 0));
+}
+
+// A part takes the memory of its marks in the mesh, then what it has itself.
+TEST(MeshPartTest, MemoryOfASmallPartIsSmall) {
+  class Asked : public MemoryLender {
+   public:
+    absl::Status Reserve(uint64_t bytes) override {
+      bytes_.push_back(bytes);
+      return absl::OkStatus();
+    }
+    absl::Status Allow(uint64_t) override { return absl::OkStatus(); }
+    std::vector<uint64_t> bytes_;
+  } lender;
+  const TestMesh mesh = KuhnGrid(3, 12);
+  std::vector<uint32_t> part_of(mesh.SimplexCount(), 0);
+  part_of[0] = 1;
+  const PartitionedMesh view{3, mesh.VertexCount(), mesh.simplices, {}, part_of};
+  RunContext context;
+  const PartOwners owners = FindOwners(view, context).value();
+  context.SetMemoryLender(&lender);
+  ASSERT_TRUE(TakePart(view, owners, 1, 0, context).ok());
+  const uint64_t marks = 2 * mesh.SimplexCount() + mesh.VertexCount();
+  EXPECT_THAT(lender.bytes_, testing::ElementsAre(marks, marks + 4 * mesh.VertexCount() + 4 * (4 + 5)));
+}
+
 TEST(MeshPartTest, AFacetOfNoSimplexIsNamed) {
   const RunContext context;
   const TestMesh mesh = KuhnGrid(2, 1);

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <csignal>
 #include <cstdlib>
 #include <fstream>
 #include <map>
@@ -189,6 +190,15 @@ TEST(PartitionTest, ACancelEndsItAtOnce) {
   canceller.join();
   EXPECT_TRUE(absl::IsCancelled(status)) << status;
   EXPECT_LT(taken, std::chrono::milliseconds(1000));
+}
+
+// A process may have been started so; then the kernel tells nobody how another one has ended.
+TEST(PartitionTest, IsTheSameWhereEndedProcessesAreIgnored) {
+  const DualGraph graph = GraphOf(KuhnGrid(3, 6));
+  const HugeVector<uint32_t> expected = PartsOf(graph, {.parts = 8});
+  const auto before = std::signal(SIGCHLD, SIG_IGN);
+  EXPECT_EQ(PartsOf(graph, {.parts = 8}), expected);
+  std::signal(SIGCHLD, before);
 }
 
 TEST(PartitionTest, MemoryIsAskedForBeforeTheWork) {

@@ -92,5 +92,12 @@ TEST(IsSmallAddition, ByWhatIsAddedAndBuiltAgain) {
   EXPECT_FALSE(IsSmallAddition(100'000, 1'000, 0));
 }
 
+TEST(IsSmallPart, ByTheMeshAndWhetherItIsCut) {
+  EXPECT_TRUE(IsSmallPart(/*is_cut=*/false, 100'000));
+  EXPECT_FALSE(IsSmallPart(/*is_cut=*/false, 1'000'000));
+  EXPECT_TRUE(IsSmallPart(/*is_cut=*/true, 1'000'000));
+  EXPECT_FALSE(IsSmallPart(/*is_cut=*/true, 100'000'000));
+}
+
 }  // namespace
 }  // namespace wellspace::server

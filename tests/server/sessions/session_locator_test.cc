@@ -40,7 +40,9 @@ class SessionLocatorTest : public ::testing::Test {
   // Has a job ask, where the last mesh is `mesh`.
   void Ask(const absl::StatusOr<std::shared_ptr<const MeshSnapshot>>& mesh, Asked& asked) {
     ASSERT_NE(pool_.Submit([this, mesh, &asked](Job& job) {
-      asked.located = locator_.Prepare([&] { return mesh; }, Lasts::kUntilWanted, job);
+      asked.located =
+          locator_.Prepare([&] { return mesh; },
+                           [&](const MeshSnapshot& found) { return MakeLocated(found, Lasts::kUntilWanted, job); });
       asked.done.Set();
     }),
               nullptr);
@@ -77,26 +79,26 @@ TEST_F(SessionLocatorTest, IsMadeOnceForAllThatAsk) {
 }
 
 TEST_F(SessionLocatorTest, AnotherMeshTakesItsPlace) {
-  EXPECT_FALSE(locator_.Has(1));
+  EXPECT_EQ(locator_.Find(1), nullptr);
   ASSERT_TRUE(Prepare(MeshOf(1)).ok());
-  EXPECT_TRUE(locator_.Has(1));
+  EXPECT_NE(locator_.Find(1), nullptr);
   const uint64_t bytes = pool_.memory.reserved();
   EXPECT_GT(bytes, 0u);
   EXPECT_EQ((*Prepare(MeshOf(2)))->revision, 2u);
-  EXPECT_FALSE(locator_.Has(1));
-  EXPECT_TRUE(locator_.Has(2));
+  EXPECT_EQ(locator_.Find(1), nullptr);
+  EXPECT_NE(locator_.Find(2), nullptr);
   EXPECT_EQ(pool_.memory.reserved(), bytes) << "the one before is freed";
 }
 
 TEST_F(SessionLocatorTest, WhatPointsAreLocatedInIsNotGivenUp) {
   Located in_use = *Prepare(MeshOf(1));
   EXPECT_EQ(locator_.SpareBytes(), 0u);
-  EXPECT_EQ(locator_.GiveUp(), nullptr);
-  EXPECT_TRUE(locator_.Has(1));
+  EXPECT_TRUE(locator_.GiveUp().empty());
+  EXPECT_NE(locator_.Find(1), nullptr);
   in_use = nullptr;
   EXPECT_EQ(locator_.SpareBytes(), pool_.memory.yielding());
-  EXPECT_NE(locator_.GiveUp(), nullptr);
-  EXPECT_FALSE(locator_.Has(1));
+  EXPECT_EQ(locator_.GiveUp().size(), 1u);
+  EXPECT_EQ(locator_.Find(1), nullptr);
   EXPECT_EQ(locator_.SpareBytes(), 0u);
   EXPECT_EQ(pool_.memory.reserved(), 0u);
 }
@@ -106,7 +108,7 @@ TEST_F(SessionLocatorTest, WhatCannotBeMadeIsAnErrorAndNothingIsKept) {
   EXPECT_EQ(Prepare(none).status(), none);
   MemoryReservation others = pool_.memory.Reserve(100 * kMegabyte, "all").value();
   EXPECT_TRUE(IsMemoryLimit(Prepare(MeshOf(1)).status()));
-  EXPECT_FALSE(locator_.Has(1));
+  EXPECT_EQ(locator_.Find(1), nullptr);
   others.Release();
   EXPECT_TRUE(Prepare(MeshOf(1)).ok());
 }

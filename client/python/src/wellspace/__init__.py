@@ -19,6 +19,7 @@ from ._locate import Located
 from ._mesh import CORNER, REPAIR, STEINER, Mesh
 from ._operations import Operation
 from ._parameters import Parameters, takes
+from ._part import MeshPart
 from ._plane import PlaneArguments, RegionPolygon, RegionSeed
 from ._progress import Progress, ProgressOption
 from ._read import CloudFile, DomainFile, read
@@ -145,6 +146,7 @@ __all__ = [
     "LocalServer",
     "Located",
     "Mesh",
+    "MeshPart",
     "MissingPackageError",
     "NotFoundError",
     "Operation",

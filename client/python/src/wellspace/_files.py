@@ -26,8 +26,14 @@ _VTK_TRIANGLE, _VTK_TETRA = 5, 10
 _REALS = {"points", "weights"}
 
 
-def save(mesh: MeshArrays, path: str | os.PathLike[str], options: dict[str, Any], order: int = 1) -> None:
-    """See Mesh.save. A file that cannot be written to its end is not there."""
+def save(
+    mesh: MeshArrays,
+    path: str | os.PathLike[str],
+    options: dict[str, Any],
+    order: int = 1,
+    members: dict[str, Any] | None = None,
+) -> None:
+    """See Mesh.save. A file that cannot be written to its end is not there. `members`: further arrays of a .npz."""
     target = pathlib.Path(path)
     if order == 2:
         _save_second_order(mesh, target, options)
@@ -53,7 +59,7 @@ def save(mesh: MeshArrays, path: str | os.PathLike[str], options: dict[str, Any]
     if options:
         raise InvalidArgumentError(f".npz takes no options; got {', '.join(options)}", field=next(iter(options)))
     with replacing(target) as file:
-        np.savez(file, **_members(mesh))
+        np.savez(file, **_members(mesh), **(members or {}))
 
 
 def _save_second_order(mesh: MeshArrays, target: pathlib.Path, options: dict[str, Any]) -> None:

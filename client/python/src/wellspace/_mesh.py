@@ -247,7 +247,8 @@ def mesh_from(m: Any, arrays: dict[str, npt.NDArray[Any]], moved: npt.NDArray[np
         facet_names={part.tag: part.name for part in m.boundary},
         regions=regions,
         region_names={region.id: region.name for region in m.regions},
-        vertex_origins=signed(arrays["vertex_origins"], m.input_point_count),
+        # Those of a part name input points of the whole mesh.
+        vertex_origins=signed(arrays["vertex_origins"], max(m.input_point_count, m.statistics.input_points)),
         vertex_tags=arrays["vertex_tags"],
         weights=arrays["weights"] if m.has_weights else None,
         moved_vertices=signed(moved, n),

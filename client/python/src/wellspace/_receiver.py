@@ -15,7 +15,7 @@ import numpy.typing as npt
 from . import _wire
 from ._api import message
 from ._checksum import crc32c
-from .errors import DamagedAnswerError, LimitError
+from .errors import DamagedAnswerError, Error, LimitError
 
 # Vertices are numbered with 32 bits; larger counts cannot be true.
 _MAX_VERTICES = 2**32 - 1
@@ -46,6 +46,13 @@ _ARRAYS = (
     _Array("input_vertices", 5, "<u4"),
     _Array("facets", 11, "<u4"),
     _Array("ridges", 12, "<u4"),
+    # Of a part of a larger mesh.
+    _Array("vertex_ids", 13, "<u4"),
+    _Array("vertex_owners", 14, "<u4"),
+    _Array("vertex_rows", 15, "<u4"),
+    _Array("simplex_ids", 16, "<u4"),
+    _Array("simplex_owners", 17, "<u4"),
+    _Array("facet_ids", 18, "<u4"),
 )
 _PLACES = {array.field: place for place, array in enumerate(_ARRAYS)}
 _INDEX, _CRC, _MOVED = 1, 2, 7  # other fields of MeshChunk
@@ -63,11 +70,14 @@ class MeshReceiver:
     ----------
     dimension, input_points : int or None
         The known properties of the mesh.
+    partition : MeshPartition or None
+        The part that was asked for; None: the whole mesh was.
     """
 
-    def __init__(self, dimension: int | None = None, input_points: int | None = None) -> None:
+    def __init__(self, dimension: int | None = None, input_points: int | None = None, partition: Any = None) -> None:
         self._dimension = dimension
         self._input_points = input_points
+        self._partition = partition
         self._expects_metadata = True
         self.metadata: Any = None
         self.next_chunk = 0
@@ -93,7 +103,7 @@ class MeshReceiver:
             metadata = message("MeshMetadata").FromString(bytes(serialized))
         except Exception as error:
             raise damaged("no message") from error
-        check_metadata(metadata, self._dimension, self._input_points)
+        check_metadata(metadata, self._dimension, self._input_points, self._partition)
         if self.metadata is not None:
             if _identity(metadata) != _identity(self.metadata):
                 raise damaged(f"a continued download of another mesh: revision {metadata.revision} after "
@@ -135,6 +145,8 @@ class MeshReceiver:
         if checksum != crc:
             raise damaged(f"chunk {index} has the CRC32C {checksum:08x}, not {crc:08x} as sent")
         check_values(self.metadata, _ARRAYS[place].name, part)
+        if self.metadata.HasField("part"):
+            check_part_values(self.metadata, _ARRAYS[place].name, first, part)
         if moved is not None:
             rows = [count // self.metadata.dimension if place == 0 else 0 for count in (first, first + len(values))]
             self._check_moved(index, moved, *rows)
@@ -201,6 +213,12 @@ def sizes_of(m: Any) -> dict[str, int]:
         "input_vertices": m.input_point_count,
         "facets": m.facet_count * m.dimension,
         "ridges": m.ridge_count * 2,
+        "vertex_ids": m.vertex_count if m.HasField("part") else 0,
+        "vertex_owners": m.vertex_count if m.HasField("part") else 0,
+        "vertex_rows": m.vertex_count if m.HasField("part") else 0,
+        "simplex_ids": m.simplex_count if m.HasField("part") else 0,
+        "simplex_owners": m.simplex_count if m.HasField("part") else 0,
+        "facet_ids": m.facet_count if m.HasField("part") else 0,
     }
 
 
@@ -210,7 +228,7 @@ def widths_of(m: Any) -> dict[str, int]:
     return {array.name: wide.get(array.name, 1) for array in _ARRAYS}
 
 
-def check_metadata(m: Any, dimension: int | None, input_points: int | None) -> None:
+def check_metadata(m: Any, dimension: int | None, input_points: int | None, partition: Any = None) -> None:
     """Raises an error unless there can be such a mesh, by its known properties."""
     if (
         not 1 <= m.dimension <= MAX_DIMENSION
@@ -234,6 +252,26 @@ def check_metadata(m: Any, dimension: int | None, input_points: int | None) -> N
         if max(sliver.vertices, default=0) >= m.vertex_count:
             raise damaged(f"a sliver names vertex {max(sliver.vertices)} of {m.vertex_count}")
     _check_names(m)
+    _check_part(m, partition)
+
+
+def _check_part(m: Any, wanted: Any) -> None:
+    """A part is the one that was asked for, and no larger than the whole."""
+    if not m.HasField("part"):
+        if wanted is not None:
+            raise Error("the server is too old for parts: it sends the whole mesh", code="UNIMPLEMENTED")
+        return
+    part = m.part
+    if wanted is None or (part.parts, part.part) != (wanted.parts, wanted.part):
+        raise damaged(f"part {part.part} of {part.parts}, which was not asked for")
+    if (
+        not part.own_vertex_count <= m.vertex_count <= part.whole_vertex_count <= _MAX_VERTICES
+        or not part.own_simplex_count <= m.simplex_count <= part.whole_simplex_count <= _MAX_SIMPLICES
+        or not m.facet_count <= part.whole_facet_count <= _MAX_SIMPLICES
+    ):
+        raise damaged(f"a part of {m.vertex_count} vertices and {m.simplex_count} simplices, which owns "
+                      f"{part.own_vertex_count} and {part.own_simplex_count}, of {part.whole_vertex_count} and "
+                      f"{part.whole_simplex_count}")
 
 
 def check_values(m: Any, name: str, values: npt.NDArray[Any]) -> None:
@@ -247,12 +285,34 @@ def check_values(m: Any, name: str, values: npt.NDArray[Any]) -> None:
             raise damaged(f"{name} name vertex {values.max()} of {m.vertex_count}")
     elif name == "input_vertices":
         _check_below(name, "vertex", values, m.vertex_count, NO_VERTEX)
-    elif name == "vertex_origins":
+    elif name == "vertex_origins" and not m.HasField("part"):  # which does not tell how many input points there are
         _check_below(name, "input point", values, m.input_point_count, CORNER_ORIGIN)
     elif name == "vertex_tags":
         _check_known(name, "tag", values, [0, *(part.tag for part in m.boundary)])
     elif name == "simplex_regions":
         _check_known(name, "region", values, [region.id for region in m.regions])
+
+
+def check_part_values(m: Any, name: str, first: int, values: npt.NDArray[Any]) -> None:
+    """Whether the values can be numbers of a part, of which `first` came before these.
+
+    They are those of vertices, simplices, facets and parts that there are; of what is owned, and of nothing else, the
+    owner is the part itself.
+    """
+    part = m.part
+    ends = {"vertex_ids": part.whole_vertex_count, "vertex_rows": part.whole_vertex_count,
+            "simplex_ids": part.whole_simplex_count, "facet_ids": part.whole_facet_count,
+            "vertex_owners": part.parts, "simplex_owners": part.parts}
+    if name not in ends:
+        return
+    wrong = values[values >= ends[name]]
+    if len(wrong):
+        raise damaged(f"{name} name {wrong[0]} of {ends[name]}")
+    own = {"vertex_owners": part.own_vertex_count, "simplex_owners": part.own_simplex_count}.get(name)
+    if own is not None:
+        is_own = np.arange(first, first + len(values)) < own
+        if ((values == part.part) != is_own).any():
+            raise damaged(f"{name} of part {part.part}, which owns the first {own}, tell other owners")
 
 
 def _check_below(name: str, what: str, values: npt.NDArray[Any], count: int, least_other: int) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,7 @@ from ._locate import Located, locate
 from ._mesh import Mesh
 from ._operations import Operation, operation_of, watch
 from ._parameters import Parameters, fill, naming, split, takes
+from ._part import MeshPart, partition_of
 from ._plane import PlaneArguments, make_plane
 from ._progress import ProgressOption, told
 from ._queries import add_vertices, nearest_distances, stream_cells
@@ -432,6 +433,7 @@ class Session:
         except Error:
             pass  # the work, if there is any, goes on
 
+    @overload
     def download(
         self,
         *,
@@ -441,15 +443,63 @@ class Session:
         progress: ProgressOption = None,
         timeout: float | None = None,
         cancel: CancelToken | None = None,
+    ) -> Mesh: ...
+
+    @overload
+    def download(
+        self,
+        *,
+        part: int,
+        parts: int,
+        ghost_layers: int = 1,
+        contiguous: bool = False,
+        boundary: bool = True,
+        revision: int | None = None,
+        progress: ProgressOption = None,
+        timeout: float | None = None,
+        cancel: CancelToken | None = None,
+    ) -> MeshPart: ...
+
+    def download(
+        self,
+        *,
+        since: Mesh | None = None,
+        part: int | None = None,
+        parts: int | None = None,
+        ghost_layers: int = 1,
+        contiguous: bool = False,
+        boundary: bool = True,
+        revision: int | None = None,
+        progress: ProgressOption = None,
+        timeout: float | None = None,
+        cancel: CancelToken | None = None,
     ) -> Mesh:
-        """The session's mesh: that of `revision`, by default the last one.
+        """The session's mesh, or a part of it: that of `revision`, by default the last one.
 
         `boundary` False leaves facets, regions and origins of vertices out.
 
         `since` is a mesh that was downloaded before: where the server knows the differences since then, they alone are
         sent. The result is the same to the bit, and a mesh of its own; `since` stays as it is.
+
+        With `part` and `parts` it is a `MeshPart`, for a solver on as many ranks of which each asks for its own:
+        ``session.download(part=comm.rank, parts=comm.size, revision=...)``. The server cuts the mesh once for all. The
+        same mesh and numbers always give the same parts; to have those of one mesh, ranks agree on its `revision`.
+
+        Parameters
+        ----------
+        part, parts : int
+            The number of the part, from 0 on, and how many there are.
+        ghost_layers : int
+            Of a part: layers of simplices of other parts around it, 0 to 16; a layer has the simplices with a vertex in
+            common with those before.
+        contiguous : bool
+            Each part hangs together by facets, if the mesh does; parts may then be less even than by 3 %.
         """
         wanted = revision_of(revision, "revision")
+        partition = partition_of(part, parts, ghost_layers, contiguous)
+        if since is not None and partition is not None:
+            raise InvalidArgumentError("part and since exclude each other: there are no differences of parts",
+                                       field="part")
         if since is not None and wanted is not None:
             raise InvalidArgumentError("revision and since exclude each other: what has changed leads to the last mesh",
                                        field="revision")
@@ -457,7 +507,7 @@ class Session:
             if since is not None:
                 update = Update(self._calls, self.name, since, boundary, on_progress)
                 return update.run(CallOptions(timeout=timeout, cancel=cancel))
-            download = Download(self._calls, self.name, boundary, wanted, on_progress)
+            download = Download(self._calls, self.name, boundary, wanted, on_progress, partition)
             return download.run(CallOptions(timeout=timeout, cancel=cancel))
 
     def add(

@@ -13,6 +13,7 @@ from ._delta import DeltaReceiver, metadata_of
 from ._domain import Bounds
 from ._mesh import Mesh, mesh_of
 from ._messages import messages_of, point_chunks, receive
+from ._part import part_of
 from ._progress import OnProgress, Progress
 from ._receiver import MeshReceiver, damaged
 from ._retry import Attempt
@@ -136,18 +137,26 @@ class Addition:
 
 
 class Download:
-    """One download of a mesh, in as many streams as it takes."""
+    """One download of a mesh or, with a MeshPartition, of a part of it, in as many streams as it takes."""
 
     def __init__(
-        self, calls: Calls, session: str, boundary: bool, revision: int | None, on_progress: OnProgress
+        self,
+        calls: Calls,
+        session: str,
+        boundary: bool,
+        revision: int | None,
+        on_progress: OnProgress,
+        partition: Any = None,
     ) -> None:
         self._calls = calls
-        self._request = _api.message("DownloadMeshRequest")(name=session, revision=revision, with_boundary=boundary)
-        self._receiver = MeshReceiver()
+        self._request = _api.message("DownloadMeshRequest")(
+            name=session, revision=revision, with_boundary=boundary, partition=partition
+        )
+        self._receiver = MeshReceiver(partition=partition)
         self._on_progress = on_progress
 
     def run(self, options: CallOptions) -> Mesh:
-        """Downloads the mesh."""
+        """Downloads the mesh, or the part: a MeshPart."""
         return self._calls.run(options, self._attempt)
 
     def _attempt(self, attempt: Attempt) -> Mesh:
@@ -167,7 +176,7 @@ class Download:
             if error.code == "DATA_LOSS" or not receiver.has_all_chunks:
                 raise
         receiver.finish()
-        return mesh_of(receiver)
+        return part_of(receiver) if request.HasField("partition") else mesh_of(receiver)
 
 
 class Update:
