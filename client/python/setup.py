@@ -1,4 +1,4 @@
-"""Makes `wellspace/_api.binpb`, the descriptors of the API, of the protos, and copies `wellspace/viewer.html`.
+"""Makes `wellspace/_api.binpb`, the descriptors of the API, of the protos, and stubs; copies `wellspace/viewer.html`.
 
 From the repository the protos are compiled by protoc, or by grpcio-tools where there is no protoc. A source
 distribution has both files, since it is built away from the repository.
@@ -14,6 +14,10 @@ from setuptools.command.build_py import build_py
 from setuptools.command.sdist import sdist
 
 HERE = pathlib.Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE))  # where a tool builds the package, it is not there
+
+from make_stubs import make_stubs  # noqa: E402
+
 PROTOS = HERE.parent.parent / "proto"
 VIEWER = HERE.parent / "viewer" / "page.html"
 DESCRIPTORS = pathlib.Path("wellspace", "_api.binpb")
@@ -55,6 +59,7 @@ class BuildWithMadeFiles(build_py):
         folder = pathlib.Path(self.build_lib).resolve()
         compile_protos(folder / DESCRIPTORS)
         copy_page(folder / PAGE)
+        make_stubs(HERE / "src" / "wellspace", folder / "wellspace")
 
 
 class SdistWithMadeFiles(sdist):

@@ -145,6 +145,9 @@ class ArraysTest(Case):
         nan[3, 1] = np.nan
         for points, message, field in (
             ([1.0, 2.0, 3.0], "shape (3,); expected (n, d)", "points"),
+            (np.zeros((2, 7)), "shape (2, 7), which looks transposed; expected (n, d): a row for each point, "
+             "with at most 6 coordinates", "points"),
+            (np.zeros((3, 1000)), "points.T has them", "points"),
             (np.zeros((2, 2, 2)), "shape (2, 2, 2)", "points"),
             (nan, "points[3] coordinate 1 is nan", "points[3]"),
             ([[0, 1], [2, -np.inf]], "points[1] coordinate 1 is -inf", "points[1]"),
@@ -161,6 +164,14 @@ class ArraysTest(Case):
                 _arrays.coordinates(points, "points")
         with self.fails(InvalidArgumentError, "3 coordinates; expected 2", field="points"):
             _arrays.coordinates(np.zeros((5, 3)), "points", 2)
+        with self.fails(InvalidArgumentError, "shape (2, 5), which looks transposed", field="holes"):
+            _arrays.coordinates(np.zeros((2, 5)), "holes", 2)
+
+    def test_small_arrays_are_not_called_transposed(self):
+        for shape in ((2, 2), (2, 3), (3, 2), (6, 6), (7, 2), (1, 2), (0, 3)):
+            self.assertEqual(_arrays.coordinates(np.zeros(shape), "points").shape, shape)
+        with self.fails(InvalidArgumentError, "points of 7 coordinates; expected 2"):
+            _arrays.coordinates(np.zeros((3, 7)), "points", 2)
 
     def test_wrong_indices(self):
         for values, message, field in (
@@ -169,6 +180,7 @@ class ArraysTest(Case):
             ([0, 1], "expected (n, 2)", "segments"),
             ([[0, 1, 2]], "expected (n, 2)", "segments"),
             ([[0.0, 1.0]], "float64; expected whole numbers", "segments"),
+            ([[0, 1, 2], [1, 2, 0]], "shape (2, 3), which looks transposed; expected (n, 2)", "segments"),
         ):
             with self.subTest(values), self.fails(InvalidArgumentError, message, field=field):
                 _arrays.indices(values, "segments", 2, 5)

@@ -23,6 +23,7 @@ from wellspace import (
     UnavailableError,
     WrongStateError,
     _api,
+    _calls,
     _progress,
     errors,
 )
@@ -117,10 +118,32 @@ class ServerTest(Case):
             self.assertTrue(client.is_serving())
 
     def test_no_server_listens(self):
-        with self.fails(UnavailableError, "", code="UNAVAILABLE"):
+        message = "no server listens at 127.0.0.1:1: the connection was refused; is wellspaced running there"
+        with self.fails(UnavailableError, message, code="UNAVAILABLE"):
             wellspace.Client("127.0.0.1:1", retry=wellspace.RetryPolicy(initial_backoff=0.01)).info()
         with self.assertRaises(ConnectionError):
             wellspace.Client("127.0.0.1:1", retry=wellspace.RetryPolicy(max_first_attempts=1)).info()
+
+    def test_other_servers_that_cannot_be_reached(self):
+        for message, expected in (
+            ("DNS resolution failed for a.example:1: not found", "the host of a.example:1 was not found: DNS"),
+            ("failed to connect to all addresses; last error: UNKNOWN: ipv4:10.0.0.1:1: No route to host",
+             "cannot connect to a.example:1: UNKNOWN: ipv4:10.0.0.1:1: No route to host"),
+            ("Socket closed", "Socket closed"),
+        ):
+            self.assertTrue(_calls._in_plain_words(message, "a.example:1").startswith(expected), message)
+
+    def test_what_clients_and_servers_say_of_themselves(self):
+        with wellspace.LocalServer() as server, wellspace.Client(server) as client:
+            self.assertEqual(repr(server), f"<wellspace.LocalServer at {server.address}: running>")
+            self.assertEqual(repr(client), f"<wellspace.Client of its own server at {server.address}>")
+            self.assertNotIn(server.credentials.token, repr(server) + repr(client))
+        self.assertEqual(repr(server), f"<wellspace.LocalServer at {server.address}: ended>")
+        self.assertEqual(repr(wellspace.Client("127.0.0.1:1")), "<wellspace.Client of the server at 127.0.0.1:1>")
+        token = wellspace.CancelToken()
+        self.assertEqual(repr(token), "<wellspace.CancelToken: not cancelled>")
+        token.cancel()
+        self.assertEqual(repr(token), "<wellspace.CancelToken: cancelled>")
 
 
 class ErrorsTest(Case):

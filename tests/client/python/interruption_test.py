@@ -68,7 +68,7 @@ class InterruptionTest(Case):
         thread.join()
 
     def test_timeout(self):
-        with self.fails(DeadlineError, "", code="DEADLINE_EXCEEDED"):
+        with self.fails(DeadlineError, "took longer than its timeout of 0.5 s", code="DEADLINE_EXCEEDED"):
             self.client.mesh(uniform(10, 3), timeout=0.5, **LONG)
         with self.assertRaises(TimeoutError):
             self.client.estimate(uniform(1000, 3), timeout=0.0)

@@ -151,7 +151,7 @@ class MeshTest(Case):
         with self.fails(LimitError, "", reason="DEMANDS_TOO_FINE"):
             wellspace.mesh(points, size=1e-9)
         with self.fails(InvalidArgumentError, "", argument="dimension"):
-            wellspace.mesh(uniform(3, 7))
+            wellspace.mesh(uniform(7, 7))
         with self.assertRaises(ValueError):
             wellspace.mesh(points, rho=0.1)
 

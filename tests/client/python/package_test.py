@@ -56,7 +56,9 @@ class PackageTest(unittest.TestCase):
         sources = {path.name for path in folder.iterdir() if path.suffix in (".py", ".typed")}
         with zipfile.ZipFile(self.wheel) as wheel:
             names = {name for name in wheel.namelist() if name.startswith("wellspace/")}
-            self.assertEqual(names, {f"wellspace/{name}" for name in sources | {"_api.binpb", "viewer.html"}})
+            made = {"_api.binpb", "viewer.html", "__init__.pyi", "_client.pyi", "_sessions.pyi", "aio.pyi"}
+            self.assertEqual(names, {f"wellspace/{name}" for name in sources | made})
+            stub = wheel.read("wellspace/__init__.pyi").decode()
             (metadata,) = [wheel.read(name).decode() for name in wheel.namelist() if name.endswith("METADATA")]
             descriptors = wheel.read("wellspace/_api.binpb")
             page = wheel.read("wellspace/viewer.html")
@@ -64,13 +66,15 @@ class PackageTest(unittest.TestCase):
                      "Description-Content-Type: text/markdown"):
             self.assertIn(line, metadata)
         self.assertTrue(self.wheel.name.endswith("-py3-none-any.whl"))
+        self.assertIn("size: Number | None", stub)
         with tarfile.open(self.sdist) as sdist:
             names = {name.partition("/")[2] for name in sdist.getnames()}
             prefix = self.sdist.name.removesuffix(".tar.gz")
             self.assertEqual(sdist.extractfile(f"{prefix}/src/wellspace/_api.binpb").read(), descriptors)
             self.assertEqual(sdist.extractfile(f"{prefix}/src/wellspace/viewer.html").read(), page)
         self.assertEqual(page, (ROOT / "client" / "viewer" / "page.html").read_bytes())
-        self.assertLessEqual({"LICENSE", "README.md", "setup.py", "pyproject.toml", "src/wellspace/py.typed"}, names)
+        self.assertLessEqual({"LICENSE", "README.md", "setup.py", "make_stubs.py", "pyproject.toml",
+                              "src/wellspace/py.typed"}, names)
 
     def test_debian_package_says_the_same(self):
         """METADATA.in, from which it has its metadata, against those of the wheel."""

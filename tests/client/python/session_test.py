@@ -224,6 +224,22 @@ class SessionTest(Case):
         with wellspace.Session(2) as session:
             session.delete()
 
+    def test_a_closed_session_stays_on_the_server(self):
+        with wellspace.Session(2) as session:
+            self.assertNotIn("closed", repr(session))
+            session.upload(uniform(10, 2))
+            session.close()
+            session.close()
+            self.assertEqual(repr(session), f"<wellspace.Session: {session.name} in 2-D at "
+                                            f"{session.client.address}, closed>")
+            for call in (session.info, session.refine, session.delete, lambda: session.upload(uniform(3, 2))):
+                with self.fails(WrongStateError, "this Session was closed; Session.attach('sessions/"):
+                    call()
+        with wellspace.Session.attach(session.name) as again:
+            self.assertEqual(again.info().point_count, 10)
+        with self.fails(NotFoundError):
+            again.info()
+
     def test_added_points_that_are_wrong(self):
         with wellspace.Session(2, box=unit_box(2)) as session:
             with self.fails(WrongStateError, "", reason="MESH_NOT_READY"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, SupportsFloat, SupportsIndex
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +11,10 @@ from .errors import InvalidArgumentError
 
 Floats = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.uint32]
+Number = SupportsFloat  # of Python or of numpy
+WholeNumber = SupportsIndex
+
+_MOST_AXES = 6  # the service says which dimensions it takes; here more are a sign of an array that is transposed
 
 
 def coordinates(values: Any, name: str, dimension: int | None = None) -> Floats:
@@ -28,9 +32,13 @@ def coordinates(values: Any, name: str, dimension: int | None = None) -> Floats:
         raise InvalidArgumentError(
             f"{name}: an array of shape {array.shape}; expected (n, d): a row for each point", field=name
         )
-    if dimension is not None and array.shape[1] != dimension:
+    rows, axes = array.shape
+    if rows == dimension != axes or dimension is None and 2 <= rows <= _MOST_AXES < axes:
+        taken = f"at most {_MOST_AXES}" if dimension is None else str(dimension)
+        raise _transposed(name, array.shape, f"(n, d): a row for each point, with {taken} coordinates")
+    if dimension is not None and axes != dimension:
         raise InvalidArgumentError(
-            f"{name}: points of {array.shape[1]} coordinates; expected {dimension}", field=name
+            f"{name}: points of {axes} coordinates; expected {dimension}", field=name
         )
     result = np.ascontiguousarray(array, "<f8")
     finite = np.isfinite(result)
@@ -63,6 +71,8 @@ def indices(values: Any, name: str, columns: int | None = None, end: int | None 
     shape = "(n,)" if columns is None else f"(n, {columns})"
     if array.dtype.kind not in "iu":
         raise InvalidArgumentError(f"{name}: an array of {array.dtype}; expected whole numbers", field=name)
+    if array.ndim == 2 and array.shape[0] == columns != array.shape[1]:
+        raise _transposed(name, array.shape, f"{shape}: a row for each")
     if array.ndim != (1 if columns is None else 2) or columns not in (None, array.shape[-1]):
         raise InvalidArgumentError(f"{name}: an array of shape {array.shape}; expected {shape}", field=name)
     wrong = (array < 0) | (array >= (2**32 if end is None else end))
@@ -168,6 +178,12 @@ def _is_like(row: Any, first: Any) -> bool:
     except ValueError:
         return False
     return array.dtype.kind in "fiu" and array.shape == np.shape(first)
+
+
+def _transposed(name: str, shape: tuple[int, ...], expected: str) -> InvalidArgumentError:
+    return InvalidArgumentError(
+        f"{name}: an array of shape {shape}, which looks transposed; expected {expected}; {name}.T has them", field=name
+    )
 
 
 def _row_error(name: str, row: Any, what: str) -> InvalidArgumentError:

@@ -15,7 +15,15 @@ import grpc
 from . import _api
 from ._channel import Credentials
 from ._retry import Attempt, CancelToken, Retrier, now
-from .errors import CredentialsError, DamagedAnswerError, Error, UnavailableError, from_status
+from .errors import (
+    CredentialsError,
+    DamagedAnswerError,
+    DeadlineError,
+    Error,
+    UnavailableError,
+    WrongStateError,
+    from_status,
+)
 
 T = TypeVar("T")
 
@@ -41,6 +49,12 @@ class Link:
     credentials: Credentials
     is_gone: Callable[[float], bool]  # whether the server will never answer again, as is known within so many seconds
     address: str = ""  # of one that another server has named
+    asked: str = ""  # the address of one that the caller has named
+
+    @property
+    def place(self) -> str:
+        """The address, for messages."""
+        return self.address or self.asked or "the server"
 
 
 # A connection that broke off may be the first sign of the end of a server of this process; its exit code is the next.
@@ -68,6 +82,16 @@ class Calls:
         self._link_to = link_to
         self._session = session
         self._retrier = retrier
+        self._end = ""  # what is said of calls after `close`
+
+    @property
+    def are_closed(self) -> bool:
+        """Whether `close` was called."""
+        return bool(self._end)
+
+    def close(self, message: str) -> None:
+        """Has further calls raise WrongStateError with this message."""
+        self._end = message
 
     def of_session(self, name: str) -> Calls:
         """The same for calls on a session, which go to the server that has it, and end with that of this process."""
@@ -79,6 +103,8 @@ class Calls:
         Where the server is gone, and another can be had, that one is asked, unless the work has begun: once, as it may
         be the call that ends servers.
         """
+        if self._end:
+            raise WrongStateError(self._end)
         deadline = math.inf if options.timeout is None else now() + options.timeout
         link = self._link
         if link.is_gone(0.0):
@@ -101,7 +127,13 @@ class Calls:
                     self._link = self._renew(used)
                 raise
 
-        return self._retrier.run(deadline, options.cancel or CancelToken(), make_unless_gone)
+        try:
+            return self._retrier.run(deadline, options.cancel or CancelToken(), make_unless_gone)
+        except DeadlineError as error:
+            if options.timeout is None or error.reason:
+                raise
+            message = f"the call to {self._link.place} took longer than its timeout of {options.timeout:g} s"
+            raise error.with_message(message) from None
 
     def _make_where_it_is(self, make: Callable[[Attempt], T], attempt: Attempt) -> T:
         """One attempt; where it says that another server has the session, or leaves that open, the next goes there."""
@@ -183,8 +215,7 @@ class Calls:
             metadata.append(("wellspace-session", self._session))
         return {"timeout": attempt.time_left(), "metadata": metadata}
 
-    @staticmethod
-    def _error(error: Any) -> Error:
+    def _error(self, error: Any) -> Error:
         code, message = error.code().name, error.details() or ""
         details = b""
         for key, value in error.trailing_metadata() or ():
@@ -192,7 +223,20 @@ class Calls:
                 details = value
         if code == "UNAVAILABLE" and not details and "handshake failed" in message.lower():
             return CredentialsError(f"the server's certificate is not trusted, or it speaks no TLS: {message}")
+        if code == "UNAVAILABLE" and not details:
+            message = _in_plain_words(message, self._link.place)
         return from_status(code, message, details)
+
+
+def _in_plain_words(message: str, place: str) -> str:
+    """What gRPC says of a server that it cannot reach, for those who do not know gRPC; its own words come last."""
+    if "connection refused" in message.lower():
+        return f"no server listens at {place}: the connection was refused; is wellspaced running there, on this port?"
+    if "DNS resolution failed" in message:
+        return f"the host of {place} was not found: {message}"
+    if "failed to connect" in message:
+        return f"cannot connect to {place}: {message.rpartition('last error: ')[2]}"
+    return message
 
 
 def session_id(name: str) -> str:

@@ -55,7 +55,14 @@ class Client:
     follow : bool
         Of several servers that share their sessions, calls on a session go to the one that has it, by the address that
         the others name, with the same credentials. False: to this one alone, behind which a proxy finds the right one.
+
+    Attributes
+    ----------
+    address : str
+        ``"HOST:PORT"`` of the server.
     """
+
+    address: str
 
     def __init__(
         self,
@@ -83,7 +90,7 @@ class Client:
         self.address, shown = _address_of(server, credentials)
         self._channel = open_channel(self.address, shown)
         own = server if isinstance(server, LocalServer) else None
-        return Link(self._channel, shown, lambda within: own is not None and own.has_ended(within))
+        return Link(self._channel, shown, lambda within: own is not None and own.has_ended(within), asked=self.address)
 
     def _renew(self, gone: Link) -> Link:
         """The way to the server that is started in the place of this process's own one, which has ended."""
@@ -107,6 +114,9 @@ class Client:
 
     def __exit__(self, *exception: Any) -> None:
         self.close()
+
+    def __repr__(self) -> str:
+        return f"<wellspace.Client of {'its own server' if self._own is not None else 'the server'} at {self.address}>"
 
     @takes(DomainArguments, PlaneArguments, TriangleArguments, SizeArguments, Parameters)
     def mesh(

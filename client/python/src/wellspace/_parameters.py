@@ -6,13 +6,14 @@ import functools
 import inspect
 import math
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypedDict, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from . import _api
-from ._arrays import Floats, choice, count, number, row_of_numbers
+from ._arrays import Floats, Number, WholeNumber, choice, count, number, row_of_numbers
 from .errors import InvalidArgumentError
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -93,26 +94,26 @@ class Parameters(TypedDict, total=False):
     """
 
     criterion: str
-    rho: float
-    min_angle: float
-    size: float
-    size_boxes: Iterable[tuple[Sequence[float], Sequence[float], float]]
-    edge_length: float
-    gradation: float
-    min_dihedral: float
-    tolerance: float
-    facet_length: float
-    min_facet_angle: float
-    min_size: float
-    per_circle: float
-    layers: float
+    rho: Number
+    min_angle: Number
+    size: Number
+    size_boxes: Iterable[tuple[npt.ArrayLike, npt.ArrayLike, Number]]
+    edge_length: Number
+    gradation: Number
+    min_dihedral: Number
+    tolerance: Number
+    facet_length: Number
+    min_facet_angle: Number
+    min_size: Number
+    per_circle: Number
+    layers: Number
     pump_weights: bool
-    merge_distance: float
+    merge_distance: Number
     keep_vertices: bool
-    box: tuple[Sequence[float], Sequence[float]]
-    margin: float
-    max_vertices: int
-    threads: int
+    box: npt.ArrayLike
+    margin: Number
+    max_vertices: WholeNumber
+    threads: WholeNumber
 
 
 # The parameters of the service that a number sets as it is.

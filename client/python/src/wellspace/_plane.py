@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _api, _wire
-from ._arrays import Floats, Indices, choice, coordinates, indices
+from ._arrays import Floats, Indices, Number, choice, coordinates, indices
 from ._domain import (
     ROWS_OF_A_REQUEST,
     SEEDS_OF_A_REQUEST,
@@ -160,7 +160,7 @@ class PlaneArguments(DomainArguments, total=False):
     faces: str
     crossings: str
     groups: Any
-    snap_distance: float
+    snap_distance: Number
 
 
 def make_plane(

@@ -11,13 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _api, _wire
-from ._arrays import Floats, Indices
+from ._arrays import Floats, Indices, indices
 from ._calls import Calls, CallOptions
 from ._cells import CellReader
 from ._mesh import signed
 from ._receiver import damaged
 from ._retry import Attempt, now
-from .errors import Error
+from .errors import Error, InvalidArgumentError
 
 _VERTICES_OF_A_REQUEST = 1 << 17  # which then has half a MiB
 _BYTES_OF_AN_ADDITION = 3 << 20  # of points, in one request: three quarters of a server's limit
@@ -87,6 +87,14 @@ def stream_cells(
         method = "QueryService/ClippedVoronoiCells"
         head = _api.message("ClippedVoronoiCellsRequest")(name=session, beta=beta)
     stream_answers(calls, method, head.SerializeToString(), vertices, reader.add, options)
+
+
+def hints_of(near: Any, points: int) -> Indices:
+    """The vertex near each of the points, where they are given."""
+    hints = indices([] if near is None else near, "near")
+    if near is not None and len(hints) != points:
+        raise InvalidArgumentError(f"near: {len(hints)} vertices for {points} points", field="near")
+    return hints
 
 
 def add_vertices(

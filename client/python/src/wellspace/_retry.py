@@ -74,6 +74,9 @@ class CancelToken:
         """Whether `cancel` was called."""
         return self._event.is_set()
 
+    def __repr__(self) -> str:
+        return f"<wellspace.CancelToken: {'cancelled' if self.is_cancelled else 'not cancelled'}>"
+
     def cancel(self) -> None:
         """Ends the calls that were given this token, and those that will be."""
         with self._lock:

@@ -76,11 +76,21 @@ class LocalServer:
     binary : path
         The program. Default: ``$WELLSPACE_SERVER_BINARY``, or `wellspaced` on the path.
 
+    Attributes
+    ----------
+    address : str
+        ``"HOST:PORT"`` on the loopback.
+    credentials : Credentials
+        With the token that it takes.
+
     Examples
     --------
     >>> with LocalServer("--max-threads", "2") as server:
     ...     mesh = wellspace.mesh(points, server=server)
     """
+
+    address: str
+    credentials: Credentials
 
     def __init__(self, *options: str, binary: str | os.PathLike[str] | None = None) -> None:
         program = os.fspath(binary) if binary is not None else find_binary()
@@ -143,6 +153,9 @@ class LocalServer:
 
     def __exit__(self, *exception: Any) -> None:
         self.close()
+
+    def __repr__(self) -> str:
+        return f"<wellspace.LocalServer at {self.address}: {'running' if self.is_running else 'ended'}>"
 
     def _forget(self) -> None:
         """In a forked child: the server is the parent's, and must not outlive it on the child's account."""

@@ -7,8 +7,10 @@ import datetime
 from typing import Any
 
 from . import _api
+from ._arrays import number
 from ._parameters import read
 from ._receiver import MAX_DIMENSION, damaged
+from .errors import InvalidArgumentError
 from .statistics import seconds_of
 
 
@@ -96,3 +98,12 @@ def info_of_session(message: Any) -> SessionInfo:
         simplex_count=message.simplex_count,
         last_operation=message.last_operation,
     )
+
+
+def set_ttl(message: Any, seconds: float) -> None:
+    """Sets a Duration to the `ttl` of a session."""
+    value = number(seconds, "ttl")
+    if not 0 <= value < 2**53:
+        raise InvalidArgumentError(f"ttl is {seconds!r}; expected seconds", field="ttl")
+    message.seconds = int(value)
+    message.nanos = round((value - int(value)) * 1e9) % 10**9

@@ -22,9 +22,9 @@ from ._parameters import Parameters, fill, naming, split, takes
 from ._part import MeshPart, partition_of
 from ._plane import PlaneArguments, make_plane
 from ._progress import ProgressOption, told
-from ._queries import add_vertices, nearest_distances, stream_cells
+from ._queries import add_vertices, hints_of, nearest_distances, stream_cells
 from ._retry import Attempt, CancelToken
-from ._session_info import SessionInfo, info_of_session
+from ._session_info import SessionInfo, info_of_session, set_ttl
 from ._sizes import SizeField, check_sizes, set_sizes, unit_of
 from ._surface import SurfaceArguments, TriangleArguments, make_surface
 from ._transfers import Addition, Download, Update, Upload
@@ -39,9 +39,12 @@ _SECONDS_TO_CANCEL = 5.0
 class Session:
     """A session of a server. Thread-safe.
 
-    As a context manager it is deleted at the end of the block. Calls take `timeout`, in seconds for all attempts
-    together, and most of them `cancel`. Those that change the session take `expected_revision`: at another revision
-    they raise `ConflictError` and change nothing.
+    As a context manager it is deleted at the end of the block, on the server, with its points and its mesh. Without
+    ``with`` it stays there until `delete`, or until nobody has used it for its `ttl`; `close` ends the use of this
+    object alone, and `attach` comes back to the session.
+
+    Calls take `timeout`, in seconds for all attempts together, and most of them `cancel`. Those that change the session
+    take `expected_revision`: at another revision they raise `ConflictError` and change nothing.
 
     Parameters
     ----------
@@ -55,6 +58,15 @@ class Session:
         Seconds that the session lives without any use. Default: the server's.
     **arguments
 
+    Attributes
+    ----------
+    name : str
+        ``"sessions/…"``, by which the server knows it; `attach` takes it.
+    dimension : int
+        Of the space.
+    client : Client
+        By which it talks to the server.
+
     Examples
     --------
     >>> with wellspace.Session(3, size=0.2) as session:
@@ -62,6 +74,10 @@ class Session:
     ...     session.refine()
     ...     mesh = session.download()
     """
+
+    client: Client
+    name: str
+    dimension: int
 
     @takes(Parameters)
     def __init__(
@@ -81,7 +97,7 @@ class Session:
         request = _api.message("CreateSessionRequest")(labels=dict(labels or {}), request_id=options.id_or_new())
         fill(request.parameters, dimension, parameters)
         if ttl is not None:
-            _set_duration(request.ttl, ttl)
+            set_ttl(request.ttl, ttl)
         client = client_of(server)
         answer = client._calls.unary("SessionService/CreateSession", request, "CreateSessionResponse", options)
         self._attach(client, answer.session.name, dimension)
@@ -105,6 +121,8 @@ class Session:
         return self
 
     def __exit__(self, kind: Any, *exception: Any) -> None:
+        if self._calls.are_closed:
+            return
         try:
             self.delete(timeout=_SECONDS_TO_CANCEL if kind is not None else None)
         except NotFoundError:
@@ -114,7 +132,8 @@ class Session:
                 raise
 
     def __repr__(self) -> str:
-        return f"<wellspace.Session: {printable(self.name)} in {self.dimension}-D at {self.client.address}>"
+        closed = ", closed" if self._calls.are_closed else ""
+        return f"<wellspace.Session: {printable(self.name)} in {self.dimension}-D at {self.client.address}{closed}>"
 
     def info(self, *, timeout: float | None = None, cancel: CancelToken | None = None) -> SessionInfo:
         """The state of the session. Renews its lease."""
@@ -144,7 +163,7 @@ class Session:
             request.session.labels.update(labels)
             request.update_mask.paths.append("labels")
         if ttl is not None:
-            _set_duration(request.session.ttl, ttl)
+            set_ttl(request.session.ttl, ttl)
             request.update_mask.paths.append("ttl")
         answer = self._calls.unary("SessionService/UpdateSession", request, "UpdateSessionResponse", options)
         return info_of_session(answer.session)
@@ -152,7 +171,11 @@ class Session:
     def delete(
         self, *, expected_revision: int | None = None, timeout: float | None = None, cancel: CancelToken | None = None
     ) -> None:
-        """Deletes the session with its points and its mesh; an operation that is under way is cancelled."""
+        """Deletes the session with its points and its mesh; an operation that is under way is cancelled.
+
+        The end of a ``with`` does so, too. Without one, a session that is not deleted stays until its `ttl` has passed.
+        Calls on it raise `NotFoundError` from then on. Meshes that were downloaded stay whole.
+        """
         options = CallOptions(timeout=timeout, cancel=cancel)
         request = _api.message("DeleteSessionRequest")(
             name=self.name,
@@ -160,6 +183,14 @@ class Session:
             expected_revision=revision_of(expected_revision, "expected_revision"),
         )
         self._calls.unary("SessionService/DeleteSession", request, "DeleteSessionResponse", options)
+
+    def close(self) -> None:
+        """Ends the use of this object, without a call: the session stays on the server, and its work goes on.
+
+        Its `name` leads back to it, by `attach`, from another process, too, until it is deleted or its `ttl` has passed
+        without use. Further calls by this object raise `WrongStateError`, and the end of a ``with`` does nothing.
+        """
+        self._calls.close(f"this Session was closed; Session.attach({printable(self.name)!r}) goes on with it")
 
     def upload(
         self,
@@ -530,9 +561,7 @@ class Session:
         given its number. With `expected_revision` a change in between raises `ConflictError`, too.
         """
         cloud = coordinates(points, "points", self.dimension)
-        hints = indices([] if near is None else near, "near")
-        if near is not None and len(hints) != len(cloud):
-            raise InvalidArgumentError(f"near: {len(hints)} vertices for {len(cloud)} points", field="near")
+        hints = hints_of(near, len(cloud))
         expected = revision_of(expected_revision, "expected_revision")
         with self._noting_interruption():
             return add_vertices(
@@ -619,11 +648,3 @@ class Session:
 
 
 Session.__doc__ = naming(Session.__doc__, Parameters)
-
-
-def _set_duration(message: Any, seconds: float) -> None:
-    value = number(seconds, "ttl")
-    if not 0 <= value < 2**53:
-        raise InvalidArgumentError(f"ttl is {seconds!r}; expected seconds", field="ttl")
-    message.seconds = int(value)
-    message.nanos = round((value - int(value)) * 1e9) % 10**9

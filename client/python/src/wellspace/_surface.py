@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _api, _wire
-from ._arrays import Floats, Indices, choice, coordinates, indices, number
+from ._arrays import Floats, Indices, Number, choice, coordinates, indices, number
 from ._domain import (
     ROWS_OF_A_REQUEST,
     SEEDS_OF_A_REQUEST,
@@ -128,10 +128,10 @@ class TriangleArguments(TypedDict, total=False):
 
     triangles: Any
     solids: str
-    crease_angle: float
-    weld: float
-    min_patch: float
-    resolution: float
+    crease_angle: Number
+    weld: Number
+    min_patch: Number
+    resolution: Number
     keep_points: bool
 
 

@@ -156,6 +156,9 @@ class Session:
     async def __aenter__(self) -> Session:
         return self
 
+    def __repr__(self) -> str:
+        return repr(self._session).replace("wellspace.", "wellspace.aio.", 1)
+
     async def __aexit__(self, *exception: Any) -> None:
         def call(cancel: CancelToken) -> None:
             self._session.__exit__(*exception)
@@ -170,6 +173,9 @@ class Session:
 
     async def delete(self, **options: Any) -> None:
         await _run(self._session.delete, **options)
+
+    def close(self) -> None:
+        self._session.close()
 
     async def upload(self, points: Any, **options: Any) -> int:
         return await _run(self._session.upload, points, **options)
@@ -229,9 +235,9 @@ def _document() -> None:
     """Methods have the docstrings, and the signatures, of those that they await."""
     for name, function in vars(Session).items():
         model = getattr(_sessions.Session, name, None)
-        if inspect.iscoroutinefunction(function) and model is not None and not function.__doc__:
+        if inspect.isfunction(function) and model is not None and not name.startswith("_") and not function.__doc__:
             function.__doc__ = model.__doc__
-            function.__signature__ = inspect.signature(model)
+            function.__signature__ = inspect.signature(model)  # type: ignore[attr-defined]
 
 
 _document()
