@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs the Debian 12 packages that Wellspace needs. The one place with package lists.
 #
-#   deploy/install-deps.sh [GROUP…]        groups: build test interoperability solvers lint tidy fuzz node browser bench container package monitoring kubernetes runtime dev; default: build test
+#   deploy/install-deps.sh [GROUP…]        groups: build test interoperability solvers lint tidy fuzz node browser bench container package monitoring kubernetes runtime docs dev; default: build test
 #
 # As root, or through sudo. Installs only what is missing; does not touch the network when nothing is.
 set -euo pipefail
@@ -14,7 +14,7 @@ declare -A packages=(
            libsqlite3-dev libpqxx-dev python3"
   [test]="libgtest-dev libgmock-dev libcgal-dev libeigen3-dev python3 python3-grpcio python3-meshio python3-numpy openssl
           metis postgresql-15 haproxy python3-protobuf python3-scipy python3-tqdm python3-yaml libisal2 mypy
-          python3-build python3-pip python3-setuptools python3-venv python3-wheel"
+          python3-build python3-numpydoc python3-pip python3-setuptools python3-sphinx python3-venv python3-wheel"
   [interoperability]="gmsh freefem++ python3-gmsh python3-h5py python3-meshio python3-vtk9 python3-numpy fish zsh"
   [solvers]="calculix-ccx openfoam python3-dolfinx python3-mpi4py python3-petsc4py"
   [lint]="git clang-format-14 python3"
@@ -27,6 +27,7 @@ declare -A packages=(
   [package]="dpkg-dev lintian groff-base debootstrap"
   [monitoring]="prometheus"
   [kubernetes]="kubernetes-client"
+  [docs]="python3 python3-grpcio python3-numpy python3-numpydoc python3-protobuf python3-sphinx"
   [runtime]="libgrpc++1.51 libprotobuf32 libabsl20220623 libspdlog1.10 libtbb12 libprometheus-cpp-core1.0 libcairo2 libmetis5 libmicrohttpd12 zlib1g
              libminizip1 liblzma5 libsz2 libsqlite3-0 libpqxx-6.4"
 )

@@ -35,7 +35,8 @@ class Mesh(MeshArrays):
     """A simplicial mesh of n vertices and m simplices in d dimensions.
 
     All numbers of vertices count from 0. Arrays of them are of int32, or of int64 where that is too small. Lengths are
-    in the unit of the input points.
+    in the unit of the input points. The arrays about the boundary, from `facets` to `vertex_tags`, are empty if the
+    mesh was asked for without it.
 
     Attributes
     ----------
@@ -77,8 +78,6 @@ class Mesh(MeshArrays):
         Figures of the mesh and of the run that made it; None for a mesh from a file.
     revision : int
         Of the session's mesh; 0 for others.
-
-    The arrays about the boundary, from `facets` to `vertex_tags`, are empty if the mesh was asked for without it.
     """
 
     def __repr__(self) -> str:

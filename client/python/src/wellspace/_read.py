@@ -87,6 +87,8 @@ def read(
 
     Parameters
     ----------
+    path : path
+        The file; ``.gz`` is unpacked.
     format : str
         The format of a file whose extension does not say it: ``"csv"``, ``"las"``, ``"geojson"`` and so on.
     columns : sequence of str or int

@@ -22,7 +22,8 @@ class SecondOrderMesh(MeshArrays):
     """A mesh whose elements have a node at the middle of each edge, behind their corners. The edges are straight.
 
     The vertices of the mesh are the first n nodes, as they were; the middles of its e edges follow. They are in the
-    order of the lower end of their edges, then of the higher one.
+    order of the lower end of their edges, then of the higher one. `facet_tags`, `facet_names`, `regions`,
+    `region_names` and the others are those of the mesh.
 
     Attributes
     ----------
@@ -41,8 +42,6 @@ class SecondOrderMesh(MeshArrays):
         The least tag of a facet that each node is of; 0 inside. Between two vertices of the boundary it may be inside.
     weights : (n + e,) float64, or None
         Of middles the mean of the ends.
-
-    `facet_tags`, `facet_names`, `regions`, `region_names` and the others are those of the mesh.
     """
 
     middle_ends: npt.NDArray[Any] = dataclasses.field(default_factory=lambda: np.empty((0, 2), np.int32))

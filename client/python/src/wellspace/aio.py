@@ -238,6 +238,8 @@ def _document() -> None:
         if inspect.isfunction(function) and model is not None and not name.startswith("_") and not function.__doc__:
             function.__doc__ = model.__doc__
             function.__signature__ = inspect.signature(model)  # type: ignore[attr-defined]
+    create: Any = vars(Session)["create"].__func__
+    create.__signature__ = inspect.signature(_sessions.Session.__init__)
 
 
 _document()
