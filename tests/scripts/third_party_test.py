@@ -46,6 +46,15 @@ class Notices(unittest.TestCase):
             for package in STATIC_OR_HEADERS:
                 self.assertIn("opyright", (pathlib.Path(folder) / package).read_text(encoding="utf-8"))
 
+    def test_copyrights_of_one_program_with_its_shared_libraries(self):
+        with tempfile.TemporaryDirectory() as folder:
+            done = self.run_script(NOTICES.read_text(encoding="utf-8"), "--copy", folder, "--with-shared",
+                                   "--program", "wellspaced")
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+            copied = {path.name for path in pathlib.Path(folder).iterdir()}
+            self.assertLessEqual({"libgrpc29", "libstdc++6", "libcli11-dev"}, copied)
+            self.assertEqual(copied & {"libc6", "libcairo2", "libhdf5-dev"}, set(), "of the system, and of the tool")
+
 
 class Hdf5(unittest.TestCase):
     def test_is_given_no_file_to_read(self):

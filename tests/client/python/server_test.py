@@ -1,11 +1,13 @@
 """The server that a process starts for itself: it is private, shared, and gone when the process is, however it ends."""
 
 import asyncio
+import contextlib
 import os
 import pathlib
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 import unittest
 from unittest import mock
@@ -150,6 +152,34 @@ class LocalServerTest(Case):
                     wellspace.LocalServer()
                 with self.assertRaises(FileNotFoundError):
                     wellspace.LocalServer()
+
+    def test_the_programs_of_a_wheel_come_before_those_on_the_path(self):
+        clean = {name: value for name, value in os.environ.items() if not name.startswith("WELLSPACE_")}
+        with tempfile.TemporaryDirectory() as folder:
+            for part in ("own", "path", "named"):
+                program = pathlib.Path(folder, part, "wellspaced")
+                program.parent.mkdir()
+                program.write_text("#!/bin/sh\n")
+                program.chmod(0o755)
+            named = {"WELLSPACE_SERVER_BINARY": f"{folder}/named/wellspaced"}
+            own = mock.patch.object(_server, "_OWN_PROGRAMS", pathlib.Path(folder, "own"))
+            for environment, own_part, expected in (({}, own, "own"), (named, own, "named"),
+                                                    ({}, contextlib.nullcontext(), "path")):
+                changes = {**clean, "PATH": f"{folder}/path", **environment}
+                with self.subTest(expected), own_part, mock.patch.dict(os.environ, changes, clear=True):
+                    self.assertEqual(_server.find_binary(), f"{folder}/{expected}/wellspaced")
+
+    def test_the_command_of_a_wheel_is_its_program(self):
+        with tempfile.TemporaryDirectory() as folder:
+            program = pathlib.Path(folder, "wellspaced")
+            program.write_text("#!/bin/sh\necho \"$@\"\nexit 3\n")
+            program.chmod(0o755)
+            code = ("import pathlib, sys; from wellspace import _commands, _server; "
+                    "_server._OWN_PROGRAMS = pathlib.Path(sys.argv.pop(1)); _commands.")
+            done = run_python(code + "wellspaced()", folder, "--listen", "a b")
+            self.assertEqual((done.returncode, done.stdout), (3, "--listen a b\n"))
+            done = run_python(code + "wellspaced()", f"{folder}/none")
+            self.assertEqual((done.returncode, done.stderr), (1, "wellspaced: this package has no server inside\n"))
 
     def test_does_not_start(self):
         with self.fails(UnavailableError, "--max-points"):

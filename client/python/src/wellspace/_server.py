@@ -47,13 +47,26 @@ exit $code
 """
 
 
+# The programs that a wheel for one platform has; packages of distributions have them on the path.
+_OWN_PROGRAMS = pathlib.Path(__file__).with_name("_programs") / "bin"
+
+
+def own_program(name: str) -> str | None:
+    """The path of a program that this package has; none if it has none."""
+    return shutil.which(name, path=os.fspath(_OWN_PROGRAMS))
+
+
 def find_program(name: str, variable: str) -> str | None:
-    """The path of the program that a variable of the environment names, or else of `name`; none if it is not there."""
-    return shutil.which(os.environ.get(variable) or name)
+    """The path of a program: that which a variable of the environment names, this package's own, or one on the path.
+
+    The package's own is of its version; another release may be on the path.
+    """
+    named = os.environ.get(variable)
+    return shutil.which(named) if named else own_program(name) or shutil.which(name)
 
 
 def find_binary() -> str:
-    """The program to start: $WELLSPACE_SERVER_BINARY, or `wellspaced` on the path."""
+    """The program to start: $WELLSPACE_SERVER_BINARY, the one of the wheel, or `wellspaced` on the path."""
     found = find_program(_BINARY, _VARIABLE)
     if found is None:
         named = os.environ.get(_VARIABLE)
@@ -74,7 +87,7 @@ class LocalServer:
     *options : str
         Of wellspaced, such as ``"--max-memory", "4GB"``.
     binary : path
-        The program. Default: ``$WELLSPACE_SERVER_BINARY``, or `wellspaced` on the path.
+        The program. Default: ``$WELLSPACE_SERVER_BINARY``, the one of the wheel, or `wellspaced` on the path.
 
     Attributes
     ----------
