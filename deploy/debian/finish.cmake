@@ -2,7 +2,8 @@
 cmake_policy(VERSION 3.25)
 set(source ${CPACK_WELLSPACE_SOURCE_DIR})
 set(stage ${CPACK_TEMPORARY_INSTALL_DIRECTORY})
-set(packages runtime wellspace server wellspaced development libwellspace-dev python python3-wellspace)
+set(packages runtime wellspace server wellspaced development libwellspace-dev core_development libwellspace-core-dev
+    python python3-wellspace documentation wellspace-doc)
 
 # run(COMMAND…) runs it, or ends.
 function(run)
@@ -20,6 +21,17 @@ file(WRITE ${stage}/changelog.Debian
      "wellspace (${debian_version}) bookworm; urgency=medium\n\n  * The release ${CPACK_PACKAGE_VERSION}.\n\n"
      " -- ${CPACK_PACKAGE_CONTACT}  ${date}\n")
 
+# What the core alone wants has a package of its own, which the other one for development depends on.
+set(from ${stage}/development/usr)
+file(GLOB_RECURSE moved RELATIVE ${from} ${from}/lib/*/libwellspace_core*.a ${from}/include/wellspace/core/*
+     ${from}/lib/*/wellspace-core*.cmake ${from}/lib/*/wellspace-config*.cmake ${from}/lib/*/wellspace-core.pc)
+foreach(path IN LISTS moved)
+  cmake_path(GET path PARENT_PATH folder)
+  file(MAKE_DIRECTORY ${stage}/core_development/usr/${folder})
+  file(RENAME ${from}/${path} ${stage}/core_development/usr/${path})
+endforeach()
+file(REMOVE_RECURSE ${from}/include/wellspace/core)
+
 # Copyright, changelog and overrides of lintian.
 while(packages)
   list(POP_FRONT packages component package)
@@ -36,7 +48,8 @@ endwhile()
 file(REMOVE ${stage}/changelog.Debian)
 
 # Licences of what is compiled in; those of shared libraries are in their own packages.
-foreach(documents server/usr/share/doc/wellspaced development/usr/share/doc/libwellspace-dev runtime/usr/share/doc/wellspace)
+foreach(documents server/usr/share/doc/wellspaced development/usr/share/doc/libwellspace-dev
+        core_development/usr/share/doc/libwellspace-core-dev runtime/usr/share/doc/wellspace)
   file(COPY ${source}/THIRD_PARTY.md DESTINATION ${stage}/${documents})
   run(${source}/scripts/third_party --build ${CPACK_WELLSPACE_BINARY_DIR} --copy ${stage}/${documents}/third_party)
   run(gzip -9nr ${stage}/${documents}/third_party)
@@ -55,6 +68,6 @@ file(REMOVE_RECURSE ${stage}/server/usr/lib)
 
 file(GLOB_RECURSE manuals ${stage}/*/usr/share/man/*)
 run(gzip -9n ${manuals})
-file(GLOB_RECURSE archives ${stage}/development/*.a)
+file(GLOB_RECURSE archives ${stage}/development/*.a ${stage}/core_development/*.a)
 run(strip --strip-debug --remove-section=.comment --enable-deterministic-archives ${archives})
 run(chmod -R u=rwX,go=rX ${stage})

@@ -15,7 +15,7 @@ import chroot
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = pathlib.Path(os.environ["WELLSPACE_BIN_DIR"]).parent
-PACKAGES = ["wellspace", "wellspaced", "libwellspace-dev", "python3-wellspace"]
+PACKAGES = ["wellspace", "wellspaced", "libwellspace-dev", "libwellspace-core-dev", "python3-wellspace", "wellspace-doc"]
 
 PYTHON = """
 import sys, numpy, wellspace
@@ -39,7 +39,7 @@ class Packages(unittest.TestCase):
         chroot.run_here(ROOT / "scripts" / "package", "--build", BUILD, cls.work)
         shutil.copy(ROOT / "examples" / "spot.csv", cls.work)
         cls.root.apt("install", "man-db", *(f"/work/{path.name}" for path in cls.work.glob("*.deb")
-                                            if not path.name.startswith("libwellspace-dev")))
+                                            if not path.name.startswith("libwellspace-")))
 
     def serve(self):
         """Starts the server there; its address."""
@@ -88,7 +88,33 @@ class Packages(unittest.TestCase):
         # The file has options that the server takes.
         self.root.run("sh", "-c", ". /etc/default/wellspaced && wellspaced $WELLSPACED_OPTIONS --help")
 
-    def test_2_programs_are_built_by_the_libraries(self):
+    def test_1_pages_and_examples(self):
+        folder = self.root.path / "usr/share/doc/wellspace-doc"
+        for path in ("README.md", "docs/python.md", "docs/images/ocean.png", "examples/spot.csv", "examples/python/plate.py"):
+            self.assertTrue((folder / path).is_file(), path)
+        for page in folder.rglob("*.md"):
+            for link in re.findall(r"\]\(([^)#\s:]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
+                target = (page.parent / link).resolve()
+                if target.is_relative_to(folder / "docs"):
+                    self.assertTrue(target.exists(), f"{page.name}: {link}")
+
+    def packages_there(self):
+        return self.root.run("dpkg-query", "--show", "--showformat=${Package}\\n").split()
+
+    def test_2_the_core_is_built_against_without_grpc_and_hdf5(self):
+        (package,) = self.work.glob("libwellspace-core-dev_*.deb")
+        self.root.apt("install", f"/work/{package.name}", "g++", "cmake", "make", "pkg-config")
+        others = [one for one in self.packages_there() if re.match(r"libgrpc.*-dev|libprotobuf-dev|libhdf5|protobuf-", one)]
+        self.assertEqual(others, [])
+        shutil.copytree(ROOT / "tests" / "install", self.work / "core-alone")
+        self.root.run("cmake", "-S", "/work/core-alone/core", "-B", "/work/alone")
+        self.root.run("cmake", "--build", "/work/alone")
+        self.assertIn(": OK\n", self.root.run("/work/alone/consumer"))
+        self.root.run("sh", "-c", "g++ -std=c++20 /work/core-alone/core/main.cc -o /work/linked-alone "
+                      "$(pkg-config --cflags --libs wellspace-core)")
+        self.assertIn(": OK\n", self.root.run("/work/linked-alone"))
+
+    def test_3_programs_are_built_by_the_libraries(self):
         (package,) = self.work.glob("libwellspace-dev_*.deb")
         self.root.apt("install", f"/work/{package.name}", "g++", "cmake", "make")
         shutil.copytree(ROOT / "tests" / "install", self.work / "programs")
@@ -102,7 +128,7 @@ class Packages(unittest.TestCase):
                       "$(pkg-config --cflags --libs wellspace-core)")
         self.assertIn(": OK\n", self.root.run("/work/linked"))
 
-    def test_3_purged(self):
+    def test_4_purged(self):
         installed = self.root.run("dpkg", "-L", *PACKAGES).splitlines()
         files = {path for path in installed if path.startswith("/") and (self.root.path / path.lstrip("/")).is_file()}
         self.assertGreater(len(files), 80)
