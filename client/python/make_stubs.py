@@ -18,9 +18,11 @@ import inspect
 import pathlib
 import sys
 from collections.abc import Iterator
+from typing import Union
 
 MODULES = ("__init__", "_client", "_sessions", "aio")
 _HEAD = "# Made of {name}.py by make_stubs.py.\n"
+Function = Union[ast.FunctionDef, ast.AsyncFunctionDef]
 _FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 # Names that a stub has no use for.
 _RUNTIME_ONLY = {"Unpack"}
@@ -113,7 +115,7 @@ class Stub:
     def _add(self, node: ast.stmt) -> None:
         """Takes a statement of the module over, if it is one for others."""
         if isinstance(node, _FUNCTIONS) and not node.name.startswith("_"):
-            self._body.append(self._function(node))
+            self._body += self._functions([node])
         elif isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
             self._body.append(self._class(node))
         elif isinstance(node, ast.Assign) and not _is_variable_of_types(node):
@@ -127,7 +129,8 @@ class Stub:
         for attribute in sorted({name for method in methods for name in _public_attributes(method)} - known):
             raise SystemExit(f"make_stubs: {self._module.name}.{node.name}.{attribute} has no type in the class")
         body: list[ast.stmt] = [one for one in node.body if isinstance(one, ast.AnnAssign)]
-        body += [self._function(one, node.name) for one in methods if _is_public(one.name) or one.name.endswith("__")]
+        for name in dict.fromkeys(one.name for one in methods if _is_public(one.name) or one.name.endswith("__")):
+            body += self._functions([one for one in methods if one.name == name], node.name)
         document = ast.get_docstring(node)
         if document is not None:
             init = next((one for one in methods if one.name == "__init__"), None)
@@ -137,37 +140,54 @@ class Stub:
         made.body = made.body or [ast.Expr(ast.Constant(...))]
         return made
 
-    def _function(self, node: ast.FunctionDef | ast.AsyncFunctionDef, of_class: str = "") -> ast.stmt:
+    def _functions(self, nodes: list[Function], of_class: str = "") -> list[Function]:
+        """The stubs of a function: one, or one for each of its overloads, of which the first has the docstring."""
+        document = ast.get_docstring(nodes[-1])
+        if of_class and nodes[-1].args.kwarg is not None and _name(nodes[-1].args.kwarg.annotation) == "Any":
+            return self._stubs_of_models(nodes[-1], of_class)
+        overloads = nodes[:-1] or nodes
+        return [self._function(node, of_class, document if node is overloads[0] else None) for node in overloads]
+
+    def _function(self, node: Function, of_class: str, document: str | None) -> Function:
         made = copy.deepcopy(node)
-        made.decorator_list = [one for one in made.decorator_list if _name(one) in ("property", "classmethod")]
+        kept = ("property", "classmethod", "overload")
+        made.decorator_list = [one for one in made.decorator_list if _name(one) in kept]
         kind = _kind_of_arguments(node)
-        document = ast.get_docstring(node)
         if kind is not None:
             made.args.kwarg = None
             for module, one in self._package.arguments_of(kind):
                 name, annotation = _name(one.target), _optional(one.annotation)
                 self._append_argument(made.args, name, annotation, ast.Constant(None), module)
-        elif node.args.kwarg is not None and _name(node.args.kwarg.annotation) == "Any":
-            document = self._take_from_model(made, of_class) or document
         made.body = [ast.Expr(ast.Constant(...))]
         if document is not None:
             made.body.insert(0, _expression(self._whole(document, kind, 8 if of_class else 4)))
         return made
 
-    def _take_from_model(self, made: ast.FunctionDef | ast.AsyncFunctionDef, of_class: str) -> str | None:
-        """A function that hands ``**options`` on has the arguments of that which it awaits; returns its docstring."""
+    def _stubs_of_models(self, node: Function, of_class: str) -> list[Function]:
+        """A method that hands ``**options`` on has the arguments of the one of `Session` that it awaits."""
         module = self._package.modules["_sessions"]
-        name = "__init__" if made.name == "create" else made.name
-        model = next(one for one in module.classes[of_class].body if isinstance(one, _FUNCTIONS) and one.name == name)
-        whole = Stub(self._package, module.name)._function(model, of_class)
-        assert isinstance(whole, ast.FunctionDef)
-        made.args.kwarg = None
-        for argument, default in zip(whole.args.kwonlyargs, whole.args.kw_defaults):
-            home = next((at for at, one in self._arguments_of(model) if _name(one.target) == argument.arg), module)
-            self._append_argument(made.args, argument.arg, argument.annotation, default, home)
-        return None if made.name == "create" else ast.get_docstring(whole)
+        name = "__init__" if node.name == "create" else node.name
+        models = [one for one in module.classes[of_class].body if isinstance(one, _FUNCTIONS) and one.name == name]
+        found = []
+        for model in Stub(self._package, module.name)._functions(models, of_class):
+            made = copy.deepcopy(node)
+            made.args.kwarg = None
+            for argument, default in zip(model.args.kwonlyargs, model.args.kw_defaults):
+                homes = (at for at, one in self._arguments_of(models[-1]) if _name(one.target) == argument.arg)
+                self._append_argument(made.args, argument.arg, argument.annotation, default, next(homes, module))
+            document = ast.get_docstring(node if name == "__init__" else model)
+            made.body = [ast.Expr(ast.Constant(...))]
+            if document is not None:
+                made.body.insert(0, _expression(self._whole(document, None, 8)))
+            if len(models) > 1:
+                made.decorator_list.append(ast.Name("overload", ast.Load()))
+                made.returns = model.returns
+                self._need(ast.Name("overload", ast.Load()), module)
+                self._need(model.returns, module)
+            found.append(made)
+        return found
 
-    def _arguments_of(self, node: ast.FunctionDef | ast.AsyncFunctionDef) -> list[tuple[Module, ast.AnnAssign]]:
+    def _arguments_of(self, node: Function) -> list[tuple[Module, ast.AnnAssign]]:
         kind = _kind_of_arguments(node)
         return [] if kind is None else list(self._package.arguments_of(kind))
 
@@ -177,9 +197,11 @@ class Stub:
         assert annotation is not None
         arguments.kwonlyargs.append(ast.arg(arg=name, annotation=annotation))
         arguments.kw_defaults.append(default)
-        if home is self._module:
-            return
-        for node in ast.walk(annotation):
+        self._need(annotation, home)
+
+    def _need(self, expression: ast.expr | None, home: Module) -> None:
+        """Has the names of an expression of another module imported."""
+        for node in ast.walk(expression) if expression is not None and home is not self._module else ():
             if isinstance(node, ast.Name) and node.id not in self._module.imports:
                 found = home.import_of(node.id)
                 if found is not None:
@@ -208,7 +230,7 @@ def _is_public(name: str) -> bool:
     return bool(name) and not name.startswith("_")
 
 
-def _public_attributes(method: ast.FunctionDef | ast.AsyncFunctionDef) -> Iterator[str]:
+def _public_attributes(method: Function) -> Iterator[str]:
     """The attributes that a method sets on its object, as other code may read them."""
     for node in ast.walk(method):
         if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store):
@@ -216,7 +238,7 @@ def _public_attributes(method: ast.FunctionDef | ast.AsyncFunctionDef) -> Iterat
                 yield node.attr
 
 
-def _kind_of_arguments(node: ast.FunctionDef | ast.AsyncFunctionDef) -> str | None:
+def _kind_of_arguments(node: Function) -> str | None:
     """The TypedDict of the ``**arguments`` of a function."""
     keywords = node.args.kwarg
     if keywords is None or not isinstance(keywords.annotation, ast.Subscript):

@@ -42,6 +42,8 @@ with wellspace.Session(3, rho=2.0, ttl=60, labels={"a": "b"}) as session:
     operation: wellspace.Operation = session.refine(progress=lambda event: print(event.fraction), size=0.1)
     session.add_triangles(triangles=[[0, 1, 2]], solids="holes", weld=0.1)
     name: str = session.name
+    part: wellspace.MeshPart = session.download(part=0, parts=2)
+    whole: wellspace.Mesh = session.download(since=mesh)
     session.close()
 
 async def later() -> wellspace.Mesh:
@@ -49,6 +51,7 @@ async def later() -> wellspace.Mesh:
         count: int = await session.upload([[0, 0, 0]], offset=0)
         await session.add([[0, 0, 0]], near=[0])
         await session.refine(rho=2.0, restart=True)
+        part: wellspace.MeshPart = await session.download(part=0, parts=2)
     return await wellspace.aio.mesh([[0, 0]], progress=True)
 """
 # Lines with one fault each, and what mypy says of it.
@@ -72,6 +75,7 @@ BAD = (
     ('await wellspace.aio.Session.create(3, mesh_size=1)', 'keyword argument "mesh_size" for "create"'),
     ('await session.refine(mesh_size=1)', 'keyword argument "mesh_size" for "refine" of "Session"'),
     ('await session.locate([[0, 0, 0]], alow_outside=True)', 'did you mean "allow_outside"'),
+    ('await session.download(prat=0, parts=2)', 'No overload variant of "download"'),
     ('number: int = wellspace.mesh([[0, 0]])', 'expression has type "Mesh"'),
     ('wellspace.mesh([[0, 0]]).simplexes', '"Mesh" has no attribute "simplexes"'),
     ('wellspace.meesh([[0, 0]])', 'Module has no attribute "meesh"'),
@@ -119,17 +123,17 @@ class StubsTest(unittest.TestCase):
     """The stubs say what the functions say of themselves."""
 
     def functions(self):
-        """Pairs of a function in a stub and the same as it runs."""
+        """Pairs of a function in a stub, one node or one for each overload, and the same as it runs."""
         for name in STUBS:
             module = importlib.import_module(f"wellspace.{name}" if name != "__init__" else "wellspace")
             tree = ast.parse((PACKAGE / f"{name}.pyi").read_text(encoding="utf-8"))
             for node in tree.body:
                 thing = getattr(module, node.name, None) if hasattr(node, "name") else None
                 if inspect.isfunction(thing):
-                    yield node, thing
+                    yield [node], thing
                 elif inspect.isclass(thing):
                     methods = [one for one in node.body if isinstance(one, (ast.FunctionDef, ast.AsyncFunctionDef))]
-                    named = {one.name: one for one in methods}
+                    named = {one.name: [other for other in methods if other.name == one.name] for one in methods}
                     public = {key for key, value in vars(thing).items() if not key.startswith("_") and callable(value)}
                     self.assertLessEqual(public, named.keys(), f"{name}.{node.name}")
                     for key, one in named.items():
@@ -139,23 +143,25 @@ class StubsTest(unittest.TestCase):
 
     def test_signatures_are_the_same(self):
         count = 0
-        for node, function in self.functions():
+        for nodes, function in self.functions():
             if (function.__module__, function.__name__) == ("wellspace.aio", "create"):
                 function = wellspace.Session.__init__
             with self.subTest(f"{function.__module__}.{function.__qualname__}"):
                 count += 1
                 expected = [p for p in inspect.signature(function).parameters.values() if p.name not in ("self", "cls")]
-                arguments = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
+                arguments = [one for node in nodes
+                             for one in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)]
                 found = {one.arg for one in arguments} - {"self", "cls"}
                 self.assertEqual(found, {one.name for one in expected if not one.kind.name.startswith("VAR_")})
-                self.assertIsNone(node.args.kwarg, "an argument without a name hides misspelt ones")
+                self.assertFalse(any(node.args.kwarg for node in nodes), "one without a name hides misspelt ones")
+                node = nodes[0]
                 if not node.name.startswith("__") or node.name == "__init__":
                     self.assertTrue(all(one.annotation is not None or one.arg in ("self", "cls") for one in arguments))
         self.assertGreater(count, 60)
 
     def test_docstrings_are_whole(self):
         documents = {}
-        for node, function in self.functions():
+        for (node, *_), function in self.functions():
             documents[f"{function.__module__}.{function.__qualname__}"] = ast.get_docstring(node) or ""
             self.assertNotIn("**arguments", ast.get_docstring(node) or "")
         for name in ("wellspace.mesh", "wellspace._sessions.Session.refine", "wellspace.aio.Session.refine"):
