@@ -15,7 +15,8 @@ from ._calls import CallOptions, next_page
 from ._cells import CellReader, Cells
 from ._client import Client, Server, client_of
 from ._domain import Bounds, DomainArguments
-from ._locate import Located, locate
+from ._locate import locate
+from ._located import Located
 from ._mesh import Mesh
 from ._operations import Operation, operation_of, watch
 from ._parameters import Parameters, fill, naming, split, takes

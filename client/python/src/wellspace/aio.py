@@ -24,7 +24,7 @@ import wellspace
 from . import _client, _mesh, _operations, _session_info, _sessions
 from ._cells import Cells
 from ._domain import DomainArguments
-from ._locate import Located
+from ._located import Located
 from ._parameters import Parameters, takes
 from ._plane import PlaneArguments
 from ._progress import Progress, ProgressOption
