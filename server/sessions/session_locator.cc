@@ -1,5 +1,6 @@
 #include "server/sessions/session_locator.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "core/base/status_macros.h"
@@ -35,6 +36,7 @@ absl::StatusOr<std::shared_ptr<const LocatedMesh>> SessionLocator::Prepare(const
   std::shared_ptr<const LocatedMesh> before;  // is freed without mutex_, and before another takes memory
   {
     std::lock_guard lock(mutex_);
+    asked_for_ = std::max(asked_for_, mesh->revision());
     if (kept_ != nullptr && kept_->revision == mesh->revision()) {
       return kept_;
     }
@@ -45,6 +47,16 @@ absl::StatusOr<std::shared_ptr<const LocatedMesh>> SessionLocator::Prepare(const
   std::lock_guard lock(mutex_);
   kept_ = located;
   return located;
+}
+
+std::shared_ptr<const LocatedMesh> SessionLocator::Replace(std::shared_ptr<const LocatedMesh> located) {
+  std::lock_guard lock(mutex_);
+  return std::exchange(kept_, std::move(located));
+}
+
+bool SessionLocator::WasAskedFor(uint64_t revision) const {
+  std::lock_guard lock(mutex_);
+  return asked_for_ == revision;
 }
 
 bool SessionLocator::Has(uint64_t revision) const {

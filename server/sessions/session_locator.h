@@ -1,4 +1,4 @@
-// The last mesh of a session, for points to be located in.
+// A mesh of a session, for points to be located in.
 #ifndef WELLSPACE_SERVER_SESSIONS_SESSION_LOCATOR_H_
 #define WELLSPACE_SERVER_SESSIONS_SESSION_LOCATOR_H_
 
@@ -43,6 +43,11 @@ class SessionLocator {
   //             CANCELLED, DATA_LOSS.
   absl::StatusOr<std::shared_ptr<const LocatedMesh>> Prepare(const LastMesh& last_mesh, Lasts lasts, Job& job);
 
+  // Keeps `located` from now on, null for none, and hands over the one before, to be freed without a lock.
+  std::shared_ptr<const LocatedMesh> Replace(std::shared_ptr<const LocatedMesh> located);
+
+  // Whether Prepare was called for the mesh at `revision`, and for no later one since.
+  bool WasAskedFor(uint64_t revision) const;
   // Whether the kept locator is of the mesh at `revision`.
   bool Has(uint64_t revision) const;
 
@@ -57,6 +62,7 @@ class SessionLocator {
   std::mutex making_mutex_;                  // before that of the session, and mutex_; held while one is made
   mutable std::mutex mutex_;                 // after that of the session
   std::shared_ptr<const LocatedMesh> kept_;  // guarded by mutex_; others get it under this alone
+  uint64_t asked_for_ = 0;                   // guarded by mutex_; the last revision; 0: none
 };
 
 }  // namespace wellspace::server

@@ -88,7 +88,6 @@ Session::Size Session::GetSize(uint64_t few) const {
   }
   if (CheckMesh(*state_).ok()) {
     size.vertices = state_->record.mesh().vertices();
-    size.has_locator = locator_.Has(state_->record.mesh().revision());
     // While vertices are added, or points removed, the mesher is theirs, and not looked at.
     const bool is_theirs = occupancy_.busy == Busy::kAddingVertices || occupancy_.busy == Busy::kRemovingPoints;
     size.replayed_steps = !is_theirs && work_.mesher == nullptr ? state_->steps.count() : 0;
@@ -97,18 +96,36 @@ Session::Size Session::GetSize(uint64_t few) const {
 }
 
 absl::StatusOr<std::shared_ptr<const LocatedMesh>> Session::PrepareLocator(uint64_t revision, Job& job) {
+  absl::StatusOr<std::shared_ptr<const MeshSnapshot>> earlier = nullptr;
+  {
+    absl::MutexLock lock(&mutex_);
+    if (!occupancy_.is_closed && earlier_mesh_ != nullptr && earlier_mesh_->revision() == revision) {
+      earlier = earlier_mesh_;
+    }
+  }
+  if (*earlier != nullptr) {
+    return earlier_locator_.Prepare([&] { return earlier; }, inputs().lasts, job);
+  }
   const auto mesh = [&]() -> absl::StatusOr<std::shared_ptr<const MeshSnapshot>> {
     absl::MutexLock lock(&mutex_);
     WELLSPACE_RETURN_IF_ERROR(CheckOpen(occupancy_, name()));
     WELLSPACE_RETURN_IF_ERROR(CheckMesh(*state_));
     if (revision != 0 && revision != work_.mesh->revision()) {
+      const std::string kept =
+          earlier_mesh_ == nullptr ? "" : absl::StrCat(", and the one that is kept, of ", earlier_mesh_->revision());
       return MakeError(v1::ERROR_REASON_REVISION_MISMATCH,
                        absl::StrCat("revision is ", revision, ", but the mesh of ", name(), " is of revision ",
-                                    work_.mesh->revision()));
+                                    work_.mesh->revision(), kept));
     }
     return work_.mesh;
   };
   return locator_.Prepare(mesh, inputs().lasts, job);
+}
+
+bool Session::HasLocator(uint64_t revision) const {
+  absl::MutexLock lock(&mutex_);
+  const uint64_t last = work_.mesh == nullptr ? 0 : work_.mesh->revision();
+  return last != 0 && (locator_.Has(revision == 0 ? last : revision) || earlier_locator_.Has(revision));
 }
 
 // One AddVertices: its parts, in their order.
