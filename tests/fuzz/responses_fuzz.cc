@@ -349,6 +349,14 @@ constexpr std::array kCalls = {
       surface.seeds = {{.x = 1, .y = 2, .z = 3, .is_hole = true, .region = 0, .max_volume = {}}};
       return c.AddTriangles(kSession, surface, std::nullopt, Patience()).status();
     }},
+    Call{[](client::Connection& c) -> absl::Status {
+      const auto carried = c.TransferValues(kSession, kPoints, {.from_revision = 1, .components = 2}, Patience());
+      if (carried.ok()) {
+        Require(carried->values.size() % 2 == 0 && carried->revision > 0, "rows are whole");
+        Require(std::ranges::all_of(carried->values, [](double x) { return std::isfinite(x); }), "values are finite");
+      }
+      return carried.status();
+    }},
 };
 
 constexpr size_t kMeshPoints = 0;
