@@ -183,6 +183,9 @@ class Session:
     async def locate(self, points: Any, **options: Any) -> Located:
         return await _run(self._session.locate, points, **options)
 
+    async def transfer(self, values: Any, from_mesh: _mesh.Mesh | int, **options: Any) -> npt.NDArray[np.float64]:
+        return await _run(self._session.transfer, values, from_mesh, **options)
+
     async def sizes(self, values: Any, points: Any = None, **options: Any) -> int:
         return await _run(self._session.sizes, values, points, **options)
 
