@@ -141,6 +141,11 @@ absl::StatusOr<Located> Client::Locate(const std::string& session, std::span<con
   return connection_->Locate(session, points, options, call);
 }
 
+absl::StatusOr<TransferredValues> Client::TransferValues(const std::string& session, std::span<const double> values,
+                                                         const TransferOptions& options, const CallOptions& call) {
+  return connection_->TransferValues(session, values, options, call);
+}
+
 absl::StatusOr<AddedVertices> Client::AddVertices(const std::string& session, std::span<const double> points,
                                                   std::span<const uint32_t> near, const OnAdded& on_added,
                                                   const CallOptions& call) {

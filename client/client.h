@@ -152,9 +152,15 @@ class Client {
   absl::Status VoronoiCells(const std::string& session, std::span<const uint32_t> vertices, const OnCells& on_cells,
                             const CallOptions& call = {});
   // Where `points`, k x dimension, row-major, lie in the session's mesh, in calls of some 10^4 points each, all about
-  // the same mesh. ABORTED (REVISION_MISMATCH) if it is replaced meanwhile.
+  // the same mesh: the last one, or an earlier one that is kept, see TransferValues. ABORTED (REVISION_MISMATCH) if it
+  // is neither.
   absl::StatusOr<Located> Locate(const std::string& session, std::span<const double> points,
                                  const LocateOptions& options = {}, const CallOptions& call = {});
+  // Carries the `values` of a field from an earlier mesh of the session to the last one. The server keeps the mesh
+  // before the last one that was downloaded last, while its memory allows it. FAILED_PRECONDITION (MESH_NOT_KEPT) if it
+  // is another; INVALID_ARGUMENT naming a value that is not finite.
+  absl::StatusOr<TransferredValues> TransferValues(const std::string& session, std::span<const double> values,
+                                                   const TransferOptions& options, const CallOptions& call = {});
   // Adds vertices at `points`, k x dimension, row-major. `near`: a vertex near each, or empty. They are sent in
   // requests with at most 3 MiB of them, 10^5 points in 3-D: the points of each become vertices all or none, and each
   // makes a revision, of which the last is returned. `call.expected_revision` is that before the call; a change in

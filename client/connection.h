@@ -92,6 +92,8 @@ class Connection {
                                     const OnCells& on_cells, const CallOptions& call) = 0;
   virtual absl::StatusOr<Located> Locate(const std::string& session, std::span<const double> points,
                                          const LocateOptions& options, const CallOptions& call) = 0;
+  virtual absl::StatusOr<TransferredValues> TransferValues(const std::string& session, std::span<const double> values,
+                                                           const TransferOptions& options, const CallOptions& call) = 0;
   virtual absl::StatusOr<AddedVertices> AddVertices(const std::string& session, std::span<const double> points,
                                                     std::span<const uint32_t> near, const OnAdded& on_added,
                                                     const CallOptions& call) = 0;

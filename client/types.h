@@ -507,6 +507,25 @@ struct LocateOptions {
   bool allow_outside = false;          // points in no simplex are no error
 };
 
+// Where the values of a field are.
+enum class FieldPlace { kVertices, kSimplices };
+
+// The options of TransferValues.
+struct TransferOptions {
+  uint64_t from_revision = 0;          // of the mesh that the values belong to: Mesh.revision
+  std::optional<uint64_t> revision{};  // of the last mesh; none: any
+  FieldPlace place = FieldPlace::kVertices;
+  size_t components = 1;      // numbers of each vertex or simplex, 1 to 64
+  bool conservative = false;  // of simplices, in 2-D and 3-D: means by exact intersection, which keep the integral
+};
+
+// A field on the last mesh of a session; see the proto's TransferValuesResponse.
+struct TransferredValues {
+  std::vector<double> values;  // rows x components, row-major
+  uint64_t revision = 0;       // of the mesh
+  uint64_t outside_count = 0;  // rows whose place is outside of the earlier mesh
+};
+
 struct AddedVertices {
   std::vector<uint32_t> vertices;  // that each point became, or was already
   uint64_t revision = 0;

@@ -87,6 +87,10 @@ class GrpcConnection final : public Connection {
                                             std::span<const uint32_t> near, const OnAdded& on_added,
                                             const CallOptions& call) override;
 
+  // transfer_values.cc
+  absl::StatusOr<TransferredValues> TransferValues(const std::string& session, std::span<const double> values,
+                                                   const TransferOptions& options, const CallOptions& call) override;
+
  private:
   // Makes a unary call of the first server until its status is final; the answer is in `response`.
   template <typename Stub, typename Request, typename Response>

@@ -41,7 +41,8 @@ class MeshLocatorIn final : public MeshLocator {
     located.coordinates.resize(count * (D + 1));
     uint32_t hint = kNoSimplex;
     size_t done = 0;
-    for (const uint32_t i : locator_.CurveOrder(points)) {
+    WELLSPACE_ASSIGN_OR_RETURN(const std::vector<uint32_t> order, locator_.CurveOrder(points, context));
+    for (const uint32_t i : order) {
       if (done++ % kPointsBetweenChecks == 0) {
         WELLSPACE_RETURN_IF_ERROR(context.Check());
       }

@@ -2,12 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numeric>
 #include <utility>
 
+#include "core/base/cancellable_sort.h"
 #include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
+#include "core/simplex/determinant.h"
+#include "core/simplex/nearest_place.h"
 
 namespace wellspace::core {
 namespace {
@@ -97,51 +101,6 @@ float RoundedDown(double x) {
   }
   const auto rounded = static_cast<float>(x);
   return static_cast<double>(rounded) > x ? std::nextafter(rounded, -kInfinity) : rounded;
-}
-
-template <size_t N>
-using Rows = std::array<std::array<double, N>, N>;
-
-double Determinant(const Rows<2>& m) { return m[0][0] * m[1][1] - m[0][1] * m[1][0]; }
-double Determinant(const Rows<3>& m) {
-  return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
-         m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
-}
-// By elimination with pivots.
-template <size_t N>
-double Determinant(Rows<N> m) {
-  double determinant = 1;
-  for (size_t k = 0; k < N; ++k) {
-    size_t pivot = k;
-    for (size_t row = k + 1; row < N; ++row) {
-      pivot = std::abs(m[row][k]) > std::abs(m[pivot][k]) ? row : pivot;
-    }
-    if (pivot != k) {
-      std::swap(m[k], m[pivot]);
-      determinant = -determinant;
-    }
-    determinant *= m[k][k];
-    for (size_t row = k + 1; row < N && m[k][k] != 0; ++row) {
-      const double factor = m[row][k] / m[k][k];
-      for (size_t axis = k + 1; axis < N; ++axis) {
-        m[row][axis] -= factor * m[k][axis];
-      }
-    }
-  }
-  return determinant;
-}
-
-// `corners` - `x`, scaled by a power of two. Returns the largest number among them, by size.
-template <int D>
-double Differences(const Simplex<D>& corners, const Point<D>& x, double scale, Simplex<D>* differences) {
-  double size = 0;
-  for (int i = 0; i <= D; ++i) {
-    for (int axis = 0; axis < D; ++axis) {
-      (*differences)[i][axis] = corners[i][axis] * scale - x[axis] * scale;
-      size = std::max(size, std::abs((*differences)[i][axis]));
-    }
-  }
-  return size;
 }
 
 // Products of differences that are so far from 1 may be beyond the range of doubles.
@@ -247,17 +206,12 @@ typename Locator<D>::Side Locator<D>::Test(uint32_t simplex, const Point<D>& x, 
     for (int axis = 0; axis < D; ++axis) {
       largest = std::max({largest, std::abs(x[axis]), std::abs(corners[0][axis]), std::abs(corners[D][axis])});
     }
-    size = Differences<D>(corners, x, std::ldexp(1.0, -std::ilogb(largest) - 2), &from_x);
+    size = Differences<D>(corners, x, ScaleOf(largest), &from_x);
   }
   const double bound = ErrorBound<D>(size);
   Side side = Side::kInside;
   for (int i = 0; i <= D; ++i) {
-    Rows<D> rows;
-    for (int k = 0; k < D; ++k) {
-      rows[k] = from_x[k < i ? k : k + 1];
-    }
-    // The corner that is left out stands before those that are behind it.
-    double volume = i % 2 == 0 ? Determinant(rows) : -Determinant(rows);
+    double volume = CornerVolume<D>(from_x, i);
     if (!(std::abs(volume) > bound)) {
       const Point<D> corner = std::exchange(corners[i], x);
       const Sign sign = Orientation<D>(corners).sign;
@@ -291,14 +245,17 @@ PlaceInSimplex<D> Locator<D>::PlaceOf(uint32_t simplex, const Volumes& volumes) 
 }
 
 template <int D>
-std::vector<uint32_t> Locator<D>::CurveOrder(std::span<const double> points) const {
+absl::StatusOr<std::vector<uint32_t>> Locator<D>::CurveOrder(std::span<const double> points,
+                                                             const RunContext& context) const {
   std::vector<std::pair<uint64_t, uint32_t>> places(points.size() / D);
   for (size_t i = 0; i < places.size(); ++i) {
-    Point<D> p;
-    std::copy_n(&points[i * D], D, p.begin());
-    places[i] = {levels_.empty() ? 0 : CurvePlace<D>(p, all_, cells_per_unit_), static_cast<uint32_t>(i)};
+    if (i % kStepsBetweenChecks == 0) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+    }
+    places[i] = {levels_.empty() ? 0 : CurvePlace<D>(PointAt<D>(points, i), all_, cells_per_unit_),
+                 static_cast<uint32_t>(i)};
   }
-  std::ranges::sort(places);
+  WELLSPACE_RETURN_IF_ERROR(CancellableSort(places, std::less(), context));
   std::vector<uint32_t> order(places.size());
   std::ranges::transform(places, order.begin(), [](const auto& place) { return place.second; });
   return order;
@@ -329,24 +286,17 @@ PlaceInSimplex<D> Locator<D>::Locate(const Point<D>& x, uint32_t hint) const {
   int beyond = 0;
   PlaceInSimplex<D> found{.simplex = kNoSimplex};
   Volumes found_volumes{};
-  // Nodes to be looked at: level and number. On each level there are at most kFan that wait.
-  struct Node {
-    size_t level;
-    size_t number;
-  };
-  std::array<Node, kFan * 18 + 1> waiting;
-  size_t count = 0;
+  NodeStack waiting;
   if (!levels_.empty() && levels_.back()[0].Contains(x)) {
-    waiting[count++] = {levels_.size() - 1, 0};
+    waiting.Push({levels_.size() - 1, 0});
   }
-  while (count > 0) {
-    const Node node = waiting[--count];
+  while (!waiting.empty()) {
+    const Node node = waiting.Pop();
     if (node.level > 0) {
       const HugeVector<RoundedBox>& below = levels_[node.level - 1];
       const size_t first = node.number * kFan;
       for (size_t child = first; child < std::min(first + kFan, below.size()); ++child) {
-        waiting[count] = {node.level - 1, child};
-        count += below[child].Contains(x) ? 1 : 0;
+        waiting.PushIf(below[child].Contains(x), {node.level - 1, child});
       }
       continue;
     }
@@ -361,6 +311,72 @@ PlaceInSimplex<D> Locator<D>::Locate(const Point<D>& x, uint32_t hint) const {
     }
   }
   return found.simplex == kNoSimplex ? found : PlaceOf(found.simplex, found_volumes);
+}
+
+template <int D>
+void Locator<D>::ForEachNear(const Box<D>& box, absl::FunctionRef<void(uint32_t)> f) const {
+  NodeStack waiting;
+  if (!levels_.empty() && levels_.back()[0].Meets(box)) {
+    waiting.Push({levels_.size() - 1, 0});
+  }
+  while (!waiting.empty()) {
+    const Node node = waiting.Pop();
+    if (node.level == 0) {
+      f(order_[node.number]);
+      continue;
+    }
+    const HugeVector<RoundedBox>& below = levels_[node.level - 1];
+    const size_t first = node.number * kFan;
+    for (size_t child = first; child < std::min(first + kFan, below.size()); ++child) {
+      if (below[child].Meets(box)) {
+        waiting.Push({node.level - 1, child});
+      }
+    }
+  }
+}
+
+template <int D>
+PlaceInSimplex<D> Locator<D>::Nearest(const Point<D>& x, double* distance) const {
+  PlaceInSimplex<D> nearest{.simplex = kNoSimplex};
+  double least_sq = std::numeric_limits<double>::infinity();
+  // Distances are squared, so they are of differences of at most about 1.
+  double largest = 0;
+  for (int axis = 0; axis < D; ++axis) {
+    largest = std::max({largest, std::abs(x[axis]), std::abs(all_.low[axis]), std::abs(all_.high[axis])});
+  }
+  const double scale = ScaleOf(largest);
+  NodeStack waiting;
+  if (!levels_.empty()) {
+    waiting.Push({levels_.size() - 1, 0});
+  }
+  while (!waiting.empty()) {
+    const Node node = waiting.Pop();
+    if (levels_[node.level][node.number].DistanceSq(x, scale) > least_sq) {
+      continue;
+    }
+    if (node.level == 0) {
+      const uint32_t simplex = order_[node.number];
+      const NearestPlace<D> place = NearestIn<D>(CornersOf(simplex), x, scale);
+      if (place.distance_sq < least_sq || (place.distance_sq == least_sq && simplex < nearest.simplex)) {
+        least_sq = place.distance_sq;
+        nearest = {.simplex = simplex, .coordinates = place.coordinates};
+      }
+      continue;
+    }
+    const HugeVector<RoundedBox>& below = levels_[node.level - 1];
+    const size_t first = node.number * kFan;
+    std::array<std::pair<double, size_t>, kFan> children;
+    size_t count = 0;
+    for (size_t child = first; child < std::min(first + kFan, below.size()); ++child) {
+      children[count++] = {below[child].DistanceSq(x, scale), child};
+    }
+    std::sort(children.begin(), children.begin() + count, std::greater());  // the nearest is looked at first
+    for (size_t k = 0; k < count; ++k) {
+      waiting.Push({node.level - 1, children[k].second});
+    }
+  }
+  *distance = std::sqrt(least_sq) / scale;
+  return nearest;
 }
 
 template <int D>

@@ -119,10 +119,10 @@ void MemoryBudget::Release(uint64_t bytes, Lasts lasts) {
   Notify();
 }
 
-void MemoryBudget::MakeLasting(uint64_t bytes, Lasts lasts) {
+void MemoryBudget::Recount(uint64_t bytes, Lasts before, Lasts lasts) {
   {
     std::lock_guard lock(mutex_);
-    Count(bytes, Lasts::kWork, -1);
+    Count(bytes, before, -1);
     Count(bytes, lasts, 1);
   }
   Notify();
@@ -171,7 +171,13 @@ MemoryReservation MemoryReservation::Split(uint64_t bytes) {
 void MemoryReservation::MakeLasting(Lasts lasts) {
   if (budget_ != nullptr && lasts_ == Lasts::kWork) {
     lasts_ = lasts;
-    budget_->MakeLasting(bytes_, lasts);
+    budget_->Recount(bytes_, Lasts::kWork, lasts);
+  }
+}
+
+void MemoryReservation::MakeYielding() {
+  if (budget_ != nullptr && lasts_ != Lasts::kUntilWanted) {
+    budget_->Recount(bytes_, std::exchange(lasts_, Lasts::kUntilWanted), Lasts::kUntilWanted);
   }
 }
 

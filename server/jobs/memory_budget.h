@@ -86,8 +86,8 @@ class MemoryBudget {
   // Whether there was room.
   bool Take(uint64_t bytes, Lasts lasts);
   void Release(uint64_t bytes, Lasts lasts);
-  // Bytes that were reserved for work last as `lasts` says from now on.
-  void MakeLasting(uint64_t bytes, Lasts lasts);
+  // Bytes that counted as `before` count as `lasts` from now on.
+  void Recount(uint64_t bytes, Lasts before, Lasts lasts);
   // Counts `bytes` more, or, if `sign` is -1, less. Wants mutex_ to be held.
   void Count(uint64_t bytes, Lasts lasts, int sign);
   void Notify();
@@ -135,6 +135,9 @@ class MemoryReservation {
   //
   // REQUIRES:   lasts != Lasts::kWork.
   void MakeLasting(Lasts lasts = Lasts::kSession);
+
+  // From now on a session keeps it until other work wants it, whatever it counted as before.
+  void MakeYielding();
 
   // Gives all back.
   void Release();

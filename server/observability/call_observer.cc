@@ -39,11 +39,11 @@ constexpr uint64_t kMessageOverhead = 256;
 constexpr uint64_t kBytesPerOverhead = 16;
 
 // Methods of wellspace.v1 whose requests the services read as bytes.
-constexpr std::array<std::string_view, 10> kReadAsBytes = {
+constexpr std::array<std::string_view, 11> kReadAsBytes = {
     "AddSegments",         "AddTriangles", "ApproximateNearestNeighbors",
     "ClippedVoronoiCells", "DownloadMesh", "EstimateMesh",
-    "MeshPoints",          "SetSizes",     "UploadPoints",
-    "VoronoiCells"};
+    "MeshPoints",          "SetSizes",     "TransferValues",
+    "UploadPoints",        "VoronoiCells"};
 
 // How many bytes a request has that an interceptor is shown, which does not learn its type. A test sends one to each
 // method.

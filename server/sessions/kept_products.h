@@ -59,6 +59,7 @@ class KeptProducts {
     }
     // After the wait: there may be another mesh by now.
     WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<const MeshSnapshot> mesh, find_mesh());
+    NoteAskedFor(mesh->revision());
     if (Made found = Find(mesh->revision(), fits); found != nullptr) {
       return found;
     }
@@ -98,12 +99,27 @@ class KeptProducts {
     return TakeIf(IsSpare);
   }
   // There is another mesh: hands over all of them; those in use live on with their users.
-  [[nodiscard]] std::vector<Made> Drop() {
+  [[nodiscard]] std::vector<Made> Drop() { return Replace({}); }
+  // Keeps `products` from now on, all of one revision, and hands over those before.
+  [[nodiscard]] std::vector<Made> Replace(std::vector<Made> products) {
     std::lock_guard lock(mutex_);
-    return TakeIf([](const Made&) { return true; });
+    std::vector<Made> before = TakeIf([](const Made&) { return true; });
+    kept_.assign(std::make_move_iterator(products.begin()), std::make_move_iterator(products.end()));
+    return before;
+  }
+
+  // Whether a product of the mesh at `revision` was asked for, and of no later one since.
+  bool WasAskedFor(uint64_t revision) const {
+    std::lock_guard lock(mutex_);
+    return asked_for_ == revision;
   }
 
  private:
+  void NoteAskedFor(uint64_t revision) {
+    std::lock_guard lock(mutex_);
+    asked_for_ = std::max(asked_for_, revision);
+  }
+
   // Wants mutex_ to be held, under which alone others get one.
   static bool IsSpare(const Made& one) { return one.use_count() == 1; }
 
@@ -140,6 +156,7 @@ class KeptProducts {
   std::mutex making_mutex_;   // before that of the session, and mutex_; held while one is made
   mutable std::mutex mutex_;  // after that of the session
   std::deque<Made> kept_;     // guarded by mutex_; the oldest first
+  uint64_t asked_for_ = 0;    // guarded by mutex_; the last revision; 0: none
 };
 
 }  // namespace wellspace::server

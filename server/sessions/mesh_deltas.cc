@@ -14,6 +14,11 @@ void MeshDeltas::NoteDownload(uint64_t revision) {
   downloaded_ = std::max(downloaded_, revision);
 }
 
+bool MeshDeltas::WasDownloaded(uint64_t revision) const {
+  std::lock_guard lock(mutex_);
+  return downloaded_ == revision;
+}
+
 bool MeshDeltas::IsWanted(uint64_t revision) const {
   std::lock_guard lock(mutex_);
   return downloaded_ == revision || (!deltas_.empty() && deltas_.back()->revision() == revision);

@@ -27,6 +27,8 @@ class MeshDeltas {
 
   // A client downloads the mesh of this revision.
   void NoteDownload(uint64_t revision);
+  // Whether one has, and none has downloaded a later one since.
+  bool WasDownloaded(uint64_t revision) const;
   // Whether the difference from the mesh of this revision, which is the last one, is of use.
   bool IsWanted(uint64_t revision) const;
 

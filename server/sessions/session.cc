@@ -303,6 +303,23 @@ SessionInputs Session::inputs() const {
           .lasts = LastsIn(log_)};
 }
 
+absl::StatusOr<std::shared_ptr<const MeshSnapshot>> Session::KeptMesh(uint64_t revision) const {
+  absl::MutexLock lock(&mutex_);
+  WELLSPACE_RETURN_IF_ERROR(CheckOpen(occupancy_, name()));
+  WELLSPACE_RETURN_IF_ERROR(CheckMesh(*state_));
+  for (const std::shared_ptr<MeshSnapshot>& mesh : {work_.mesh, earlier_mesh_}) {
+    if (mesh != nullptr && mesh->revision() == revision) {
+      return mesh;
+    }
+  }
+  return MakeError(
+      v1::ERROR_REASON_MESH_NOT_KEPT,
+      absl::StrCat("the mesh of revision ", revision, " is not kept; ", name(), " has that of revision ",
+                   work_.mesh->revision(),
+                   earlier_mesh_ == nullptr ? " alone" : absl::StrCat(" and that of ", earlier_mesh_->revision()),
+                   ". Of earlier ones that which was downloaded last is kept, while memory allows it"));
+}
+
 std::shared_ptr<const MeshSnapshot> Session::mesh() const {
   absl::MutexLock lock(&mutex_);
   return work_.mesh;
@@ -350,13 +367,19 @@ void Session::NoteIdle() const {
   }
 }
 
+uint64_t Session::SpareEarlierBytes() const {
+  // A file takes no memory.
+  const bool is_spare = !log_.is_durable() && earlier_mesh_ != nullptr && earlier_mesh_.use_count() == 1;
+  return earlier_locator_.SpareBytes() + (is_spare ? earlier_mesh_->memory_bytes() : 0);
+}
+
 std::optional<Session::Spare> Session::GetSpare() const {
   absl::MutexLock lock(&mutex_);
-  if (!log_.is_durable() || !occupancy_.IsIdle()) {
-    return std::nullopt;
+  uint64_t bytes = SpareEarlierBytes();
+  if (log_.is_durable() && occupancy_.IsIdle()) {
+    bytes += (work_.mesher == nullptr ? 0 : work_.memory.bytes()) + locator_.SpareBytes() + cuts_.SpareBytes() +
+             deltas_.memory_bytes();
   }
-  const uint64_t bytes = (work_.mesher == nullptr ? 0 : work_.memory.bytes()) + locator_.SpareBytes() +
-                         cuts_.SpareBytes() + deltas_.memory_bytes();
   const Lease& lease = occupancy_.lease;
   return bytes == 0
              ? std::nullopt
@@ -365,20 +388,25 @@ std::optional<Session::Spare> Session::GetSpare() const {
 
 uint64_t Session::GiveUpMesher() {
   SessionWork given_up;
+  Retired earlier;
   std::vector<SessionLocator::Made> located;
   std::vector<SessionCuts::Made> cuts;
   std::vector<MeshDeltas::Delta> deltas;
   uint64_t bytes = 0;
   {
     absl::MutexLock lock(&mutex_);
-    if (!log_.is_durable() || !occupancy_.IsIdle() || occupancy_.queries > 0) {
-      return 0;
+    bytes = SpareEarlierBytes();
+    earlier.located = earlier_locator_.GiveUp();
+    if (!log_.is_durable() && earlier_mesh_ != nullptr && earlier_mesh_.use_count() == 1) {
+      earlier.mesh = std::move(earlier_mesh_);
     }
-    located = locator_.GiveUp();
-    cuts = cuts_.GiveUp();
-    given_up = work_.TakeMesher();
-    bytes = deltas_.memory_bytes();
-    deltas = deltas_.GiveUp();
+    if (log_.is_durable() && occupancy_.IsIdle() && occupancy_.queries == 0) {
+      located = locator_.GiveUp();
+      cuts = cuts_.GiveUp();
+      given_up = work_.TakeMesher();
+      bytes += deltas_.memory_bytes();
+      deltas = deltas_.GiveUp();
+    }
   }
   bytes += given_up.memory.bytes();
   for (const SessionLocator::Made& one : located) {
@@ -388,6 +416,7 @@ uint64_t Session::GiveUpMesher() {
     bytes += one->memory.bytes();
   }
   given_up.mesher = nullptr;  // before others may have its memory
+  earlier = {};
   located.clear();
   cuts.clear();
   deltas.clear();

@@ -197,6 +197,11 @@ class Session {
 
   // The last mesh; null before the first.
   std::shared_ptr<const MeshSnapshot> mesh() const;
+  // The mesh of `revision`: the last one, or the one before it that was downloaded, or located points in, last. That is
+  // kept while memory allows it.
+  //
+  // Errors:     MESH_NOT_READY, MESH_NOT_KEPT, naming those that are, SESSION_NOT_FOUND.
+  absl::StatusOr<std::shared_ptr<const MeshSnapshot>> KeptMesh(uint64_t revision) const;
   // The differences that are known between the last mesh and those before.
   MeshDeltas& deltas() const { return deltas_; }
   // Runs `query` on this thread, a worker's. Any number of queries run at once. An operation that begins waits for the
@@ -212,14 +217,15 @@ class Session {
     uint64_t bytes = 0;                              // that GiveUpMesher frees
     absl::Duration last_use = absl::ZeroDuration();  // since boot
   };
-  // Nothing of a session that is busy, or whose structure is in use, or which ends with the process.
+  // Nothing of a session that is busy, or whose structure is in use, or which ends with the process, but an earlier
+  // mesh.
   std::optional<Spare> GetSpare() const;
   // To be called, without a lock, where the session was busy, or its structure, its locator or a cut in use: it may be
   // spared.
   void NoteIdle() const;
-  // Gives the mesher up for other work, the locator, cuts, and the differences of meshes. All but the last come
-  // back as PrepareStructure, PrepareLocator, PrepareCut and operations say. Returns how much memory that has freed: 0,
-  // and nothing is done, where there is nothing to spare.
+  // Gives the mesher up for other work, the locators, cuts, the differences of meshes, and an earlier mesh that is in
+  // memory. All but the last two come back as PrepareStructure, PrepareLocator, PrepareCut and operations say. Returns
+  // how much memory that has freed: 0, and nothing is done, where there is nothing to spare.
   //
   // Complexity: that of freeing the mesher, on this thread, without a lock.
   uint64_t GiveUpMesher();
@@ -246,10 +252,13 @@ class Session {
                                             uint64_t expected_revision, core::RunContext& context,
                                             const AnswerTo<AddedVertices>& answer = nullptr);
 
-  // The session's last mesh, for points to be located in: the kept one, or made by `job`. `revision` 0: any.
+  // The session's mesh of `revision`, as KeptMesh has it, for points to be located in: the kept one, or made by `job`.
+  // 0: the last one.
   //
   // Errors:     MESH_NOT_READY, REVISION_MISMATCH, SESSION_NOT_FOUND; those of MakeLocated.
   absl::StatusOr<std::shared_ptr<const LocatedMesh>> PrepareLocator(uint64_t revision, Job& job);
+  // Whether PrepareLocator makes none.
+  bool HasLocator(uint64_t revision) const;
 
   // The cut of `mesh`, a mesh of the session: the kept one, or made by `job`. `*is_at_work`: another job makes one
   // now, and the cut is null; to be tried again.
@@ -270,7 +279,6 @@ class Session {
     std::vector<double> some_points;  // all, if they are at most `few`; else none
     uint64_t vertices = 0;            // of the last mesh
     uint64_t replayed_steps = 0;  // that have to be replayed before other work than one that begins a structure anew
-    bool has_locator = false;     // of the last mesh, so that PrepareLocator makes none
   };
   Size GetSize(uint64_t few) const;
 
@@ -374,6 +382,18 @@ class Session {
   // Errors:     SESSION_NOT_FOUND, DATA_LOSS.
   absl::Status LoadInputs() ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_) ABSL_LOCKS_EXCLUDED(mutex_);
 
+  // The last mesh is about to be replaced. It is kept as earlier_mesh_ if clients have it; what is not kept any more is
+  // handed over, to be freed without a lock.
+  struct Retired {
+    std::vector<SessionLocator::Made> located;
+    std::shared_ptr<MeshSnapshot> mesh;
+  };
+  Retired RetireMesh() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // Its memory is other work's, if that wants it.
+  void YieldEarlierMesh() ABSL_LOCKS_EXCLUDED(mutex_);
+  // The bytes of the earlier mesh and its locator that other work can have.
+  uint64_t SpareEarlierBytes() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+
   // Of a session that was deleted: the points file that has only uncommitted points goes, too.
   void DropUnnamed() ABSL_LOCKS_EXCLUDED(mutex_);
 
@@ -393,8 +413,9 @@ class Session {
   // guards all that others see; it is never held over meshing, or over a commit.
   mutable absl::Mutex change_mutex_ ABSL_ACQUIRED_BEFORE(mutex_);
   mutable absl::Mutex mutex_;
-  // These have locks of their own. No thread holds change_mutex_ and wants the first or the second.
-  SessionLocator locator_;
+  // These have locks of their own. No thread holds change_mutex_ and wants one of the first three.
+  SessionLocator locator_;          // of the last mesh
+  SessionLocator earlier_locator_;  // of earlier_mesh_
   SessionCuts cuts_{kMostCuts};
   mutable MeshDeltas deltas_;
 
@@ -402,7 +423,9 @@ class Session {
   std::shared_ptr<const SessionState> state_ ABSL_GUARDED_BY(mutex_);
   mutable Occupancy occupancy_ ABSL_GUARDED_BY(mutex_);  // queries come and go
   PointAccount account_ ABSL_GUARDED_BY(mutex_);         // of points and bytes, vertices that are being added included
-  Stores stores_ ABSL_GUARDED_BY(mutex_);     // the work that has made the session busy reads them by inputs()
+  Stores stores_ ABSL_GUARDED_BY(mutex_);  // the work that has made the session busy reads them by inputs()
+  // A mesh before the last one, for clients that have it; null: none.
+  std::shared_ptr<MeshSnapshot> earlier_mesh_ ABSL_GUARDED_BY(mutex_);
   SessionWork work_ ABSL_GUARDED_BY(mutex_);  // its mesher is away while work has the session
   std::deque<std::shared_ptr<Operation>> operations_ ABSL_GUARDED_BY(mutex_);  // those of the state, alive
 };

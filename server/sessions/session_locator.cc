@@ -1,5 +1,6 @@
 #include "server/sessions/session_locator.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "core/base/status_macros.h"

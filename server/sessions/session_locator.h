@@ -1,4 +1,4 @@
-// The last mesh of a session, for points to be located in.
+// A mesh of a session, for points to be located in.
 #ifndef WELLSPACE_SERVER_SESSIONS_SESSION_LOCATOR_H_
 #define WELLSPACE_SERVER_SESSIONS_SESSION_LOCATOR_H_
 

@@ -147,11 +147,12 @@ absl::Status Session::CommitSuccess(Operation& operation, WorkResult& result) {
     bytes_before = work_.mesh == nullptr ? 0 : work_.mesh->loaded_bytes();
     WELLSPACE_RETURN_IF_ERROR(account_.TakeMesh(bytes));
   }
-  // Dropped differences and sizes are freed without the lock, and products of the mesh before.
+  // Dropped differences, sizes and meshes are freed without the lock, and products of the mesh before.
   std::vector<MeshDeltas::Delta> deltas;
   std::vector<SessionLocator::Made> located;
   std::vector<SessionCuts::Made> cuts;
   SizeSets sizes;
+  Retired retired;
   SessionChange change;
   const auto show = [&] {
     mutex_.AssertHeld();
@@ -163,6 +164,7 @@ absl::Status Session::CommitSuccess(Operation& operation, WorkResult& result) {
     }
     if (work_.mesh != nullptr) {
       work_.mesh->MakeObsolete();
+      retired = RetireMesh();
     }
     if (occupancy_.is_closed) {
       result.mesh->MakeObsolete();
@@ -220,9 +222,30 @@ bool Session::EndWork(Operation& operation, WorkResult& result) {
       occupancy_.EndBusy(clock_.since_boot());
     }
   }
+  result.work.mesh = nullptr;  // nobody but the session has an earlier mesh, so that it can be given up
+  YieldEarlierMesh();
   operation.Notify();
   NoteIdle();
   return true;
+}
+
+void Session::YieldEarlierMesh() {
+  std::shared_ptr<MeshSnapshot> earlier;
+  {
+    absl::MutexLock lock(&mutex_);
+    earlier = earlier_mesh_;
+  }
+  if (earlier != nullptr) {
+    earlier->YieldMemory();
+  }
+}
+
+Session::Retired Session::RetireMesh() {
+  const uint64_t revision = work_.mesh->revision();
+  if (!deltas_.WasDownloaded(revision) && !locator_.WasAskedFor(revision)) {
+    return {.located = {}, .mesh = nullptr};  // no client has values on it; they may on the one before
+  }
+  return {.located = earlier_locator_.Replace(locator_.Drop()), .mesh = std::exchange(earlier_mesh_, work_.mesh)};
 }
 
 absl::StatusOr<std::shared_ptr<Job>> Session::Cancel(Operation& operation) {

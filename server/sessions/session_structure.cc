@@ -95,7 +95,6 @@ Session::Size Session::GetSize(uint64_t few) const {
   }
   if (CheckMesh(*state_).ok()) {
     size.vertices = state_->record.mesh().vertices();
-    size.has_locator = locator_.Find(state_->record.mesh().revision()) != nullptr;
     // While vertices are added, or points removed, the mesher is theirs, and not looked at.
     const bool is_theirs = occupancy_.busy == Busy::kAddingVertices || occupancy_.busy == Busy::kRemovingPoints;
     size.replayed_steps = !is_theirs && work_.mesher == nullptr ? state_->steps.count() : 0;
@@ -104,19 +103,32 @@ Session::Size Session::GetSize(uint64_t few) const {
 }
 
 absl::StatusOr<std::shared_ptr<const LocatedMesh>> Session::PrepareLocator(uint64_t revision, Job& job) {
+  absl::StatusOr<std::shared_ptr<const MeshSnapshot>> earlier = nullptr;
+  {
+    absl::MutexLock lock(&mutex_);
+    if (!occupancy_.is_closed && earlier_mesh_ != nullptr && earlier_mesh_->revision() == revision) {
+      earlier = earlier_mesh_;
+    }
+  }
+  const Lasts lasts = inputs().lasts;
+  const auto make = [&](const MeshSnapshot& found) { return MakeLocated(found, lasts, job); };
+  if (*earlier != nullptr) {
+    return earlier_locator_.Prepare([&] { return earlier; }, make);
+  }
   const auto mesh = [&]() -> absl::StatusOr<std::shared_ptr<const MeshSnapshot>> {
     absl::MutexLock lock(&mutex_);
     WELLSPACE_RETURN_IF_ERROR(CheckOpen(occupancy_, name()));
     WELLSPACE_RETURN_IF_ERROR(CheckMesh(*state_));
     if (revision != 0 && revision != work_.mesh->revision()) {
+      const std::string kept =
+          earlier_mesh_ == nullptr ? "" : absl::StrCat(", and the one that is kept, of ", earlier_mesh_->revision());
       return MakeError(v1::ERROR_REASON_REVISION_MISMATCH,
                        absl::StrCat("revision is ", revision, ", but the mesh of ", name(), " is of revision ",
-                                    work_.mesh->revision()));
+                                    work_.mesh->revision(), kept));
     }
     return work_.mesh;
   };
-  const Lasts lasts = inputs().lasts;
-  return locator_.Prepare(mesh, [&](const MeshSnapshot& found) { return MakeLocated(found, lasts, job); });
+  return locator_.Prepare(mesh, make);
 }
 
 absl::StatusOr<std::shared_ptr<const MeshCut>> Session::PrepareCut(const std::shared_ptr<const MeshSnapshot>& mesh,
@@ -135,6 +147,12 @@ absl::StatusOr<std::shared_ptr<const MeshCut>> Session::PrepareCut(const std::sh
 
 bool Session::HasCut(const MeshSnapshot& mesh, const core::PartitionOptions& options) const {
   return cuts_.Find(mesh.revision(), IsCutWith(options)) != nullptr;
+}
+
+bool Session::HasLocator(uint64_t revision) const {
+  absl::MutexLock lock(&mutex_);
+  const uint64_t last = work_.mesh == nullptr ? 0 : work_.mesh->revision();
+  return last != 0 && (locator_.Find(revision == 0 ? last : revision) != nullptr || earlier_locator_.Find(revision) != nullptr);
 }
 
 // One AddVertices: its parts, in their order.

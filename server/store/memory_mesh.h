@@ -2,6 +2,7 @@
 #ifndef WELLSPACE_SERVER_STORE_MEMORY_MESH_H_
 #define WELLSPACE_SERVER_STORE_MEMORY_MESH_H_
 
+#include <atomic>
 #include <memory>
 
 #include "server/store/mesh_chunks.h"
@@ -17,6 +18,11 @@ class MemoryMesh final : public MeshSnapshot {
   uint64_t memory_bytes() const override { return chunks_->memory_bytes(); }
   void KeepMemory(MemoryReservation memory) override { chunks_->KeepMemory(std::move(memory)); }
   void MakeObsolete() override {}
+  void YieldMemory() override {
+    if (!yields_.exchange(true)) {
+      chunks_->YieldMemory();
+    }
+  }
   absl::StatusOr<v1::MeshMetadata> Metadata(bool with_boundary) const override;
   absl::StatusOr<uint64_t> ChunkCount(bool with_boundary) const override { return chunks_->count(with_boundary); }
   absl::StatusOr<grpc::ByteBuffer> SerializeChunk(uint64_t index, int field, bool with_boundary) const override;
@@ -28,6 +34,7 @@ class MemoryMesh final : public MeshSnapshot {
 
  private:
   const std::shared_ptr<MeshChunks> chunks_;
+  std::atomic<bool> yields_ = false;
 };
 
 }  // namespace wellspace::server

@@ -70,6 +70,8 @@ class MeshChunks {
   uint64_t memory_bytes() const;
   // Keeps the reservation of its memory as long as the mesh lives.
   void KeepMemory(MemoryReservation memory) { memory_ = std::move(memory); }
+  // It is kept until other work wants it. To be called once, after that.
+  void YieldMemory() { memory_.MakeYielding(); }
 
   const core::Mesh& mesh() const { return mesh_; }
   uint64_t count(bool with_boundary = false) const;

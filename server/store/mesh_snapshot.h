@@ -48,6 +48,8 @@ class MeshSnapshot {
 
   // The session has another mesh now: this one's file is removed at the end of its use.
   virtual void MakeObsolete() = 0;
+  // Other work may have its memory from now on: it is kept until that wants it. No lock of a session is to be held.
+  virtual void YieldMemory() {}
 
   // The message that is sent ahead of the chunks; their number and the revision are in it.
   //

@@ -75,6 +75,8 @@ class MockConnection : public Connection {
               (const std::string&, std::span<const uint32_t>, const OnCells&, const CallOptions&), (override));
   MOCK_METHOD(absl::StatusOr<Located>, Locate,
               (const std::string&, std::span<const double>, const LocateOptions&, const CallOptions&), (override));
+  MOCK_METHOD(absl::StatusOr<TransferredValues>, TransferValues,
+              (const std::string&, std::span<const double>, const TransferOptions&, const CallOptions&), (override));
   MOCK_METHOD(absl::StatusOr<AddedVertices>, AddVertices,
               (const std::string&, std::span<const double>, std::span<const uint32_t>, const OnAdded&,
                const CallOptions&),
@@ -192,11 +194,14 @@ TEST(Client, PassesQueriesToItsConnection) {
   EXPECT_CALL(*connection, VoronoiCells("s", SizeIs(3), _, _)).WillOnce(Return(E("cells")));
   EXPECT_CALL(*connection, Locate("s", SizeIs(2), Field(&LocateOptions::revision, std::optional<uint64_t>(5)), _))
       .WillOnce(Return(E("locate")));
+  EXPECT_CALL(*connection, TransferValues("s", SizeIs(2), Field(&TransferOptions::from_revision, 4), _))
+      .WillOnce(Return(E("transfer")));
   EXPECT_CALL(*connection, AddVertices("s", SizeIs(2), SizeIs(3), _, _)).WillOnce(Return(E("add")));
   EXPECT_EQ(client.ApproximateNearestNeighbors("s", vertices, nullptr), E("nearest"));
   EXPECT_EQ(client.ClippedVoronoiCells("s", vertices, 4, nullptr), E("clipped"));
   EXPECT_EQ(client.VoronoiCells("s", vertices, nullptr), E("cells"));
   EXPECT_EQ(client.Locate("s", points, {.revision = 5}).status(), E("locate"));
+  EXPECT_EQ(client.TransferValues("s", points, {.from_revision = 4}).status(), E("transfer"));
   EXPECT_EQ(client.AddVertices("s", points, vertices).status(), E("add"));
 }
 

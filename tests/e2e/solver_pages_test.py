@@ -115,9 +115,14 @@ class SolverPagesTest(unittest.TestCase):
 
     @unittest.skipUnless(has_module("scipy.sparse"), "python3-scipy is not installed")
     def test_time(self):
-        found = re.search(r"^(\d+) vertices, heat (\S+)$", Page(self, "time").run_all(), re.MULTILINE)
+        output = Page(self, "time").run_all()
+        found = re.search(r"^(\d+) vertices, heat (\S+)$", output, re.MULTILINE)
         self.assertIsNotNone(found)
-        self.assertAlmostEqual(float(found[2]), 0.00785, delta=0.05 * 0.00785)
+        self.assertAlmostEqual(float(found[2]), 0.00785, delta=0.01 * 0.00785)
+        fixed = re.search(r"^(\d+) vertices of the fixed mesh, error (\S+) times that$", output, re.MULTILINE)
+        self.assertIsNotNone(fixed)
+        self.assertLess(float(fixed[2]), 2)
+        self.assertLess(3 * int(found[1]), int(fixed[1]))
 
 
 if __name__ == "__main__":

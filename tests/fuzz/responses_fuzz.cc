@@ -373,11 +373,19 @@ constexpr std::array kCalls = {
       }
       return status;
     }},
+    Call{[](client::Connection& c) -> absl::Status {
+      const auto carried = c.TransferValues(kSession, kPoints, {.from_revision = 1, .components = 2}, Patience());
+      if (carried.ok()) {
+        Require(carried->values.size() % 2 == 0 && carried->revision > 0, "rows are whole");
+        Require(std::ranges::all_of(carried->values, [](double x) { return std::isfinite(x); }), "values are finite");
+      }
+      return carried.status();
+    }},
 };
 
 constexpr size_t kMeshPoints = 0;
 constexpr size_t kDownloadMesh = 10;
-constexpr size_t kDownloadPart = kCalls.size() - 1;
+constexpr size_t kDownloadPart = kCalls.size() - 2;
 
 template <typename Response>
 std::string WithChecksum(std::string bytes) {

@@ -82,7 +82,7 @@ absl::Status LocateCall::Submit() {
   WELLSPACE_RETURN_IF_ERROR(CheckFinite(points_, dimension, offset_));
   WELLSPACE_ASSIGN_OR_RETURN(revision_, RevisionFromProto(request_->has_revision(), request_->revision(), "revision"));
   allow_outside_ = request_->allow_outside();
-  const bool is_small = session->GetSize(0).has_locator;
+  const bool is_small = session->HasLocator(revision_);
   use_.emplace(std::move(session));
   WELLSPACE_ASSIGN_OR_RETURN(
       job_, environment().jobs.Submit({.tenant = caller().tenant,

@@ -5,6 +5,7 @@
 #include "server/services/queries/add_vertices_call.h"
 #include "server/services/queries/locate_call.h"
 #include "server/services/queries/query_call.h"
+#include "server/services/queries/transfer_values_call.h"
 #include "server/services/queries/vertex_query.h"
 
 namespace wellspace::server {
@@ -27,6 +28,11 @@ grpc::ServerWriteReactor<grpc::ByteBuffer>* QueryService::VoronoiCells(grpc::Cal
 grpc::ServerUnaryReactor* QueryService::Locate(grpc::CallbackServerContext* context, const v1::LocateRequest* request,
                                                v1::LocateResponse* response) {
   return LocateCall::Begin(std::make_shared<LocateCall>(environment_, context, request, response));
+}
+
+grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* QueryService::TransferValues(
+    grpc::CallbackServerContext* context) {
+  return TransferValuesCall::Begin(std::make_shared<TransferValuesCall>(environment_, context));
 }
 
 grpc::ServerUnaryReactor* QueryService::AddVertices(grpc::CallbackServerContext* context,

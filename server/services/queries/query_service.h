@@ -7,11 +7,11 @@
 
 namespace wellspace::server {
 
-// Queries are read and written as bytes, which the workers make.
+// Queries and values are read and written as bytes, which the workers make.
 using QueryServiceBase = v1::QueryService::WithRawCallbackMethod_ApproximateNearestNeighbors<
-    v1::QueryService::WithRawCallbackMethod_ClippedVoronoiCells<
-        v1::QueryService::WithRawCallbackMethod_VoronoiCells<v1::QueryService::WithCallbackMethod_Locate<
-            v1::QueryService::WithCallbackMethod_AddVertices<v1::QueryService::Service>>>>>;
+    v1::QueryService::WithRawCallbackMethod_ClippedVoronoiCells<v1::QueryService::WithRawCallbackMethod_VoronoiCells<
+        v1::QueryService::WithRawCallbackMethod_TransferValues<v1::QueryService::WithCallbackMethod_Locate<
+            v1::QueryService::WithCallbackMethod_AddVertices<v1::QueryService::Service>>>>>>;
 
 // Thread safety: thread-safe.
 class QueryService final : public QueryServiceBase {
@@ -27,6 +27,8 @@ class QueryService final : public QueryServiceBase {
                                                            const grpc::ByteBuffer* request) override;
   grpc::ServerUnaryReactor* Locate(grpc::CallbackServerContext* context, const v1::LocateRequest* request,
                                    v1::LocateResponse* response) override;
+  grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* TransferValues(
+      grpc::CallbackServerContext* context) override;
   grpc::ServerUnaryReactor* AddVertices(grpc::CallbackServerContext* context, const v1::AddVerticesRequest* request,
                                         v1::AddVerticesResponse* response) override;
 

@@ -1,6 +1,7 @@
 #include "server/services/sessions/upload_points_call.h"
 
 #include <mutex>
+#include <span>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -9,6 +10,7 @@
 #include "server/calls/wire.h"
 #include "server/services/resource_names.h"
 #include "server/services/session_fields.h"
+#include "server/sessions/retry_with_room.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
@@ -100,9 +102,11 @@ void UploadPointsCall::Take(const v1::UploadPointsRequest& request) {
   Session& session = session_->session();
   coordinate_count_ += coordinates.size();
   environment().observability.work().OnPoints(coordinates.size() / session.dimension());
+  const std::span<const double> points(coordinates.data(), static_cast<size_t>(coordinates.size()));
+  // Points are in memory only where sessions have no more to give up than earlier meshes: that is quick.
   absl::Status status = RunGuarded([&] {
-    return session.Append(request.point_offset(), {coordinates.data(), static_cast<size_t>(coordinates.size())},
-                          expected_revision);
+    return RetryWithRoom(environment().memory, points.size_bytes(),
+                         [&] { return session.Append(request.point_offset(), points, expected_revision); });
   });
   if (!status.ok()) {
     End(std::move(status));

@@ -152,6 +152,8 @@ struct FakeQueries final : v1::QueryService::Service {
   Streaming<v1::ClippedVoronoiCellsRequest, v1::ClippedVoronoiCellsResponse> clipped;
   Streaming<v1::VoronoiCellsRequest, v1::VoronoiCellsResponse> cells;
   Unary<v1::LocateRequest, v1::LocateResponse> locate;
+  using TransferStream = grpc::ServerReaderWriter<v1::TransferValuesResponse, v1::TransferValuesRequest>;
+  std::function<grpc::Status(TransferStream& stream)> transfer;
   Unary<v1::AddVerticesRequest, v1::AddVerticesResponse> add;
 
   grpc::Status ApproximateNearestNeighbors(
@@ -170,6 +172,9 @@ struct FakeQueries final : v1::QueryService::Service {
   grpc::Status Locate(grpc::ServerContext* /*context*/, const v1::LocateRequest* request,
                       v1::LocateResponse* response) override {
     return locate(*request, *response);
+  }
+  grpc::Status TransferValues(grpc::ServerContext* /*context*/, TransferStream* stream) override {
+    return transfer(*stream);
   }
   grpc::Status AddVertices(grpc::ServerContext* /*context*/, const v1::AddVerticesRequest* request,
                            v1::AddVerticesResponse* response) override {

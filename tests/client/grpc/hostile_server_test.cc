@@ -63,6 +63,87 @@ v1::LocateResponse GoodPlace() {
   return response;
 }
 
+class HostileTransfer : public ::testing::Test {
+ protected:
+  HostileTransfer() {
+    answers_.resize(2);
+    answers_[0].mutable_start()->set_revision(9);
+    answers_[0].mutable_start()->set_row_count(2);
+    for (const double value : {1.5, 2.5, 3.5, 4.5}) {
+      answers_[1].mutable_values()->add_values(value);
+    }
+    server_.queries.transfer = [this](FakeQueries::TransferStream& stream) {
+      v1::TransferValuesRequest request;
+      requests_.clear();
+      while (stream.Read(&request)) {
+        requests_.push_back(request);
+      }
+      for (const v1::TransferValuesResponse& answer : answers_) {
+        stream.Write(answer);
+      }
+      return grpc::Status::OK;
+    };
+  }
+
+  absl::StatusOr<TransferredValues> Transfer(std::optional<uint64_t> revision = std::nullopt) {
+    const std::vector<double> values = {1, 2, 3, 4, 5, 6};
+    return server_.Client().TransferValues(kSession, values,
+                                           {.from_revision = 8,
+                                            .revision = revision,
+                                            .place = FieldPlace::kSimplices,
+                                            .components = 2,
+                                            .conservative = true});
+  }
+
+  FakeServer server_;
+  std::vector<v1::TransferValuesRequest> requests_;
+  std::vector<v1::TransferValuesResponse> answers_;
+};
+
+TEST_F(HostileTransfer, WhatIsRightIsTaken) {
+  const absl::StatusOr<TransferredValues> carried = Transfer(9);
+  ASSERT_TRUE(carried.ok()) << carried.status();
+  EXPECT_THAT(carried->values, ElementsAre(1.5, 2.5, 3.5, 4.5));
+  EXPECT_EQ(carried->revision, 9u);
+  ASSERT_EQ(requests_.size(), 2u);
+  const v1::TransferValuesRequest::Start& start = requests_[0].start();
+  EXPECT_EQ(start.name(), kSession);
+  EXPECT_EQ(start.from_revision(), 8u);
+  EXPECT_EQ(start.revision(), 9u);
+  EXPECT_EQ(start.place(), v1::FIELD_PLACE_SIMPLICES);
+  EXPECT_EQ(start.components(), 2u);
+  EXPECT_TRUE(start.conservative());
+  EXPECT_THAT(requests_[1].values().values(), ElementsAre(1, 2, 3, 4, 5, 6));
+}
+
+TEST_F(HostileTransfer, ValuesAreAsManyAsWereAnnounced) {
+  const std::vector<v1::TransferValuesResponse> good = answers_;
+  ExpectDamaged(Transfer(8).status(), "values on the mesh of revision 9, not 8");
+  answers_[1].mutable_values()->add_values(5.5);
+  ExpectDamaged(Transfer().status(), "more than 4 values");
+  answers_[1].mutable_values()->mutable_values()->Truncate(3);
+  ExpectDamaged(Transfer().status(), "3 of 4 values");
+  answers_[1].mutable_values()->add_values(std::nan(""));
+  ExpectDamaged(Transfer().status(), "a value that is not finite");
+  answers_ = {good[1]};
+  ExpectDamaged(Transfer().status(), "values without a start");
+  answers_ = {good[0], good[0]};
+  ExpectDamaged(Transfer().status(), "a second start of values");
+  answers_ = {};
+  ExpectDamaged(Transfer().status(), "0 of 0 values");
+  answers_ = good;
+  answers_[0].mutable_start()->set_row_count(~uint64_t{0} / 2 + 3);
+  ExpectDamaged(Transfer().status(), "rows");
+}
+
+TEST_F(HostileTransfer, RowsAreWholeBeforeAnythingIsSent) {
+  const std::vector<double> values = {1, 2, 3};
+  for (const size_t components : {0, 2, 65}) {
+    EXPECT_TRUE(absl::IsInvalidArgument(
+        server_.Client().TransferValues(kSession, values, {.from_revision = 8, .components = components}).status()));
+  }
+}
+
 class HostileLocate : public ::testing::Test {
  protected:
   HostileLocate() {

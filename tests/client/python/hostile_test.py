@@ -126,6 +126,43 @@ class LocateTest(HostileCase):
             self.session().locate([[0.5, 0.5]], allow_outside=True)
 
 
+class TransferTest(HostileCase):
+    def says(self, *values, revision=9, rows=2, more=()):
+        response = _api.message("TransferValuesResponse")
+        answers = [response(), response()]
+        answers[0].start.revision, answers[0].start.row_count = revision, rows
+        answers[1].values.values.extend(values)
+        self.server.answers["TransferValues"] = [*answers, *more]
+
+    def transfer(self):
+        return self.session().transfer([[1, 2], [3, 4], [5, 6]], 8, revision=9)
+
+    def test_what_is_right(self):
+        self.says(1.5, 2.5, 3.5, 4.5)
+        np.testing.assert_array_equal(self.transfer(), [[1.5, 2.5], [3.5, 4.5]])
+        self.says(rows=0)
+        self.assertEqual(self.transfer().shape, (0, 2))
+
+    def test_what_cannot_be(self):
+        for values, options, message in (
+            ([1, 2, 3], {}, "3 of 4 values"),
+            ([1, 2, 3, 4, 5], {}, "more than 4 values"),
+            ([1, 2, 3, NAN], {}, "not finite"),
+            ([1, 2, 3, INFINITY], {}, "not finite"),
+            ([1, 2, 3, 4], {"revision": 8}, "revision 8, not 9"),
+            ([1, 2, 3, 4], {"revision": 0}, "revision 0"),
+            ([1, 2, 3, 4], {"rows": 2**63}, "4 of "),
+            ([1, 2, 3, 4], {"more": [b"\x08\x01"]}, "no values"),
+        ):
+            self.says(*values, **options)
+            with self.subTest(message), self.damaged(message):
+                self.transfer()
+        for answers, message in (([], "without a start"), ([b"\xff"], "no message")):
+            self.server.answers["TransferValues"] = answers
+            with self.subTest(message), self.damaged(message):
+                self.transfer()
+
+
 class QueriesTest(HostileCase):
     def distances(self, *values):
         answer = _api.message("ApproximateNearestNeighborsResponse")(distances=values)

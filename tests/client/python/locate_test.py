@@ -1,5 +1,6 @@
 """Points located in the mesh of a session."""
 
+import dataclasses
 import time
 import unittest
 
@@ -91,6 +92,65 @@ class LocateTest(Case):
             start = time.monotonic()
             session.locate(points)
             self.assertLess(time.monotonic() - start, 10)
+
+class MeshLocateTest(Case):
+    def test_places_are_those_of_the_server(self):
+        for dimension, count in ((2, 30_000), (3, 10_000), (4, 1_000), (5, 100)):
+            with wellspace.Session(dimension, box=unit_box(dimension), min_dihedral=0) as session:
+                session.upload(uniform(60 if dimension < 5 else 3, dimension))
+                session.refine()
+                mesh = session.download()
+                points = uniform(count, dimension, seed=9)
+                expected, located = session.locate(points), mesh.locate(points)
+                np.testing.assert_array_equal(located.simplices, expected.simplices)
+                np.testing.assert_array_equal(located.vertices, expected.vertices)
+                np.testing.assert_allclose(located.coordinates, expected.coordinates, atol=1e-12)
+                self.assertEqual((located.revision, located.vertex_count), (mesh.revision, len(mesh.points)))
+                np.testing.assert_allclose(mesh.interpolate(points, mesh.points), points, atol=1e-12)
+                np.testing.assert_array_equal(mesh.interpolate(mesh.points, mesh.points), mesh.points)
+
+    def test_points_on_faces_are_in_a_simplex(self):
+        mesh = wellspace.mesh(uniform(300, 2), box=unit_box(2))
+        edges = mesh.points[mesh.simplices[:, :2]]
+        located = mesh.locate(edges.mean(axis=1))
+        least = located.coordinates.min(axis=1)
+        self.assertLess(least.max(), 1e-9)
+        np.testing.assert_allclose(located.interpolate(mesh.points), edges.mean(axis=1), atol=1e-14)
+
+    def test_points_outside(self):
+        mesh = wellspace.mesh(uniform(20, 2), box=unit_box(2))
+        with self.fails(InvalidArgumentError, "points[1] lies in no simplex", field="points"):
+            mesh.locate([[0.5, 0.5], [2, 2]])
+        located = mesh.locate([[0.5, 0.5], [2, 2], [-1e308, 1e308]], allow_outside=True)
+        np.testing.assert_array_equal(located.simplices[1:], -1)
+        np.testing.assert_array_equal(located.coordinates[1:], 0)
+        found = mesh.interpolate([[0.5, 0.5], [2, 2]], np.ones(len(mesh.points)), allow_outside=True)
+        self.assertTrue(np.isnan(found[1]))
+        self.assertAlmostEqual(found[0], 1)
+        with self.fails(InvalidArgumentError, "points[1]"):
+            mesh.locate([[0.5, 0.5], [np.nan, 0]])
+        with self.fails(InvalidArgumentError, "points of 3 coordinates"):
+            mesh.locate([[0.5, 0.5, 0.5]])
+        with self.fails(InvalidArgumentError, f"each of the {len(mesh.points)} vertices", field="values"):
+            mesh.interpolate([[0.5, 0.5]], [1.0])
+        self.assertEqual(mesh.locate(np.empty((0, 2))).coordinates.shape, (0, 3))
+
+    def test_coordinates_of_every_exponent(self):
+        unit = wellspace.mesh(uniform(20, 3), box=unit_box(3))
+        points = uniform(50, 3, seed=4)
+        expected = unit.locate(points)
+        for exponent in range(-1000, 1024, 88):
+            scale = 2.0**exponent
+            mesh = dataclasses.replace(unit, points=unit.points * scale)
+            located = mesh.locate(points * scale)
+            np.testing.assert_array_equal(located.simplices, expected.simplices)
+            np.testing.assert_array_equal(located.coordinates, expected.coordinates)
+            self.assertLess(mesh.locate([[-2.0**1023] * 3], allow_outside=True).simplices[0], 0)
+
+    def test_a_mesh_without_simplices_has_no_place(self):
+        mesh = wellspace.mesh(uniform(20, 2), box=unit_box(2))
+        empty = dataclasses.replace(mesh, simplices=mesh.simplices[:0])
+        self.assertEqual(empty.locate([[0.5, 0.5]], allow_outside=True).simplices.tolist(), [-1])
 
 
 if __name__ == "__main__":

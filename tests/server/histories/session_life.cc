@@ -452,19 +452,29 @@ std::string SessionLife::CheckFolder() {
     return census.status().ToString();
   }
   std::set<std::string> named;
-  std::set<std::string> may_be_begun;  // where points are appended that no record names yet
+  std::set<std::string> may_be_begun;      // where points are appended that no record names yet
+  std::set<std::string> may_have_earlier;  // sessions with a mesh, of which the process may keep the one before
   for (const store::v1::SessionRecord& session : census->sessions) {
     const std::vector<std::string> files = FilesOf(paths, session);
     named.insert(files.begin(), files.end());
+    const std::string id = session.name().substr(session.name().find('/') + 1);
+    if (session.has_mesh()) {
+      may_have_earlier.insert(id);
+    }
     const std::vector<store::v1::PointsFile> points = PointsFilesOf(session);
     if (points.empty() || points.back().epoch() < census->oldest_epoch) {
-      may_be_begun.insert(session.name().substr(session.name().find('/') + 1));
+      may_be_begun.insert(id);
     }
   }
   for (const std::string& name : disk_.List(paths.files())) {
     const bool is_begun = EpochOfName(name) == census->oldest_epoch && name.find(".points") != std::string::npos &&
                           may_be_begun.erase(name.substr(0, name.find('.'))) > 0;
-    if (!is_begun && !named.contains(absl::StrCat(paths.files(), "/", name))) {
+    if (is_begun || named.contains(absl::StrCat(paths.files(), "/", name))) {
+      continue;
+    }
+    const bool is_earlier = name.find(".mesh-") != std::string::npos &&
+                            may_have_earlier.erase(name.substr(0, name.find('.'))) > 0;  // one at most
+    if (!is_earlier) {
       return absl::StrCat("a file too many: ", name);
     }
   }

@@ -15,7 +15,7 @@ from ._channel import Credentials
 from ._client import Client, MeshArguments, Server, client_of
 from ._domain import DomainArguments
 from ._dual import DualCells
-from ._locate import Located
+from ._located import Located
 from ._mesh import CORNER, REPAIR, STEINER, Mesh
 from ._operations import Operation
 from ._parameters import Parameters, takes

@@ -12,19 +12,18 @@ import numpy.typing as npt
 from . import _api
 from ._arrays import coordinates, indices, number, revision_of
 from ._calls import CallOptions, next_page
-from ._cells import CellReader, Cells
 from ._client import Client, Server, client_of
 from ._domain import Bounds, DomainArguments
-from ._locate import Located, locate
 from ._mesh import Mesh
 from ._operations import Operation, operation_of, watch
 from ._parameters import Parameters, fill, naming, split, takes
 from ._part import MeshPart, partition_of
 from ._plane import PlaneArguments, make_plane
 from ._progress import ProgressOption, told
-from ._queries import add_vertices, hints_of, nearest_distances, stream_cells
+from ._queries import add_vertices
 from ._retry import Attempt, CancelToken
 from ._session_info import SessionInfo, info_of_session, set_ttl
+from ._session_queries import SessionQueries
 from ._sizes import SizeField, check_sizes, set_sizes, unit_of
 from ._surface import SurfaceArguments, TriangleArguments, make_surface
 from ._transfers import Addition, Download, Update, Upload
@@ -36,7 +35,7 @@ if TYPE_CHECKING:
 _SECONDS_TO_CANCEL = 5.0
 
 
-class Session:
+class Session(SessionQueries):
     """A session of a server. Thread-safe.
 
     As a context manager it is deleted at the end of the block, on the server, with its points and its mesh. Without
@@ -592,59 +591,6 @@ class Session:
         )
         answer = self._calls.unary("SessionService/RemovePoints", request, "RemovePointsResponse", options)
         return int(answer.committed_points)
-
-    def locate(
-        self,
-        points: Any,
-        *,
-        allow_outside: bool = False,
-        revision: int | None = None,
-        timeout: float | None = None,
-        cancel: CancelToken | None = None,
-    ) -> Located:
-        """The simplex of the session's mesh that each of `points`, (n, d), lies in, and its place there.
-
-        ``session.locate(points).interpolate(values)`` carries a function from the vertices of the mesh to the points.
-
-        Parameters
-        ----------
-        allow_outside : bool
-            Points in no simplex, outside the domain or in a hole, are no error.
-        revision : int
-            `Mesh.revision` that the mesh must have; should it be another, `ConflictError` is raised. Default: any.
-        """
-        cloud = coordinates(points, "points", self.dimension)
-        options = CallOptions(timeout=timeout, cancel=cancel)
-        return locate(self._calls, self.name, cloud, revision_of(revision, "revision"), allow_outside, options)
-
-    def nearest(
-        self, vertices: Any = None, *, timeout: float | None = None, cancel: CancelToken | None = None
-    ) -> npt.NDArray[np.float64]:
-        """The distance of each of `vertices`, by default of all, to its nearest other vertex; exact. Shape (c,)."""
-        wanted = indices([] if vertices is None else vertices, "vertices")
-        if vertices is not None and not len(wanted):
-            return np.empty(0)
-        return nearest_distances(self._calls, self.name, wanted, CallOptions(timeout=timeout, cancel=cancel))
-
-    def cells(
-        self,
-        vertices: Any = None,
-        *,
-        beta: float | None = None,
-        timeout: float | None = None,
-        cancel: CancelToken | None = None,
-    ) -> Cells:
-        """The Voronoi cells of `vertices`, by default of all, in the box.
-
-        With `beta`, at least 1, each is clipped by the cube about its vertex of which half the side is `beta` times the
-        distance to the nearest other vertex.
-        """
-        wanted = indices([] if vertices is None else vertices, "vertices")
-        reader = CellReader(self.dimension)
-        if vertices is None or len(wanted):
-            limit = None if beta is None else number(beta, "beta")
-            stream_cells(self._calls, self.name, wanted, limit, reader, CallOptions(timeout=timeout, cancel=cancel))
-        return reader.cells()
 
 
 Session.__doc__ = naming(Session.__doc__, Parameters)

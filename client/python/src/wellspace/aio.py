@@ -24,7 +24,7 @@ import wellspace
 from . import _client, _mesh, _operations, _session_info, _sessions
 from ._cells import Cells
 from ._domain import DomainArguments
-from ._locate import Located
+from ._located import Located
 from ._parameters import Parameters, takes
 from ._plane import PlaneArguments
 from ._progress import Progress, ProgressOption
@@ -188,6 +188,9 @@ class Session:
 
     async def locate(self, points: Any, **options: Any) -> Located:
         return await _run(self._session.locate, points, **options)
+
+    async def transfer(self, values: Any, from_mesh: _mesh.Mesh | int, **options: Any) -> npt.NDArray[np.float64]:
+        return await _run(self._session.transfer, values, from_mesh, **options)
 
     async def sizes(self, values: Any, points: Any = None, **options: Any) -> int:
         return await _run(self._session.sizes, values, points, **options)

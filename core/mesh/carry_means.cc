@@ -1,0 +1,290 @@
+#include "core/mesh/carry_means.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "core/base/status_macros.h"
+#include "core/base/thread_team.h"
+#include "core/mesh/kept_parts.h"
+#include "core/mesh/view_rows.h"
+#include "core/simplex/determinant.h"
+#include "core/simplex/overlap.h"
+
+namespace wellspace::core {
+namespace {
+
+constexpr size_t kSimplicesOfABlock = size_t{1} << 8;
+constexpr size_t kSimplicesBetweenChecks = size_t{1} << 4;
+constexpr size_t kPartsBetweenChecks = size_t{1} << 10;  // each has up to 64 components
+constexpr size_t kBlocksOfAThread = 16;                  // of a round
+
+// A simplex of which the other mesh has all but this part is taken for covered: that much is rounding, of flat ones.
+constexpr double kUncovered = 1e-6;
+
+// An overlap that is a smaller part of both simplices is rounding.
+constexpr double kLeastPart = 1e-14;
+
+// A simplex of the new mesh, and the part of an old one that it has.
+struct Part {
+  uint32_t simplex;
+  double part;
+};
+
+// The parts of some old simplices, one after the other.
+struct PartsOfBlock {
+  std::vector<Part> parts;
+  std::vector<size_t> ends;  // by simplex
+};
+
+// One transfer: its parts, in their order.
+template <int D>
+class MeanTransfer {
+ public:
+  MeanTransfer(const Field& field, const MeshView& from, const MeshView& onto, const CarryRun& run)
+      : field_(field), from_(from), onto_(onto), run_(run) {}
+
+  absl::StatusOr<CarriedField> Run() {
+    WELLSPACE_RETURN_IF_ERROR(run_.context.AllowMemory(run_.held_bytes + Bytes()));
+    WELLSPACE_RETURN_IF_ERROR(Prepare());
+    WELLSPACE_RETURN_IF_ERROR(Distribute());
+    return Finish();
+  }
+
+ private:
+  size_t from_count() const { return from_.simplices.size() / (D + 1); }
+  size_t onto_count() const { return onto_.simplices.size() / (D + 1); }
+
+  uint64_t Bytes() const;
+  // Twins, and volumes in a unit in which all are within the range of doubles.
+  absl::Status Prepare();
+  double VolumeOf(const Simplex<D>& corners) const;
+  // Hands the mass of each old simplex out to the new ones.
+  absl::Status Distribute();
+  // The parts of the old simplices from `begin` to `end`.
+  absl::Status FillBlock(size_t begin, size_t end, PartsOfBlock* block) const;
+  // The parts of the old simplex `s` that new ones have, behind those in `parts`; of a covered one they add up to 1.
+  void FindParts(size_t s, std::vector<Part>* parts) const;
+  absl::Status HandOut(size_t s, std::span<const Part> parts);
+  // Makes values of the masses.
+  absl::StatusOr<CarriedField> Finish();
+  // Values for new simplices that no old one overlaps: those of the old ones nearest to their centroids.
+  absl::Status FillOutside(const std::vector<uint32_t>& outside, CarriedField* carried) const;
+
+  const Field& field_;
+  const MeshView& from_;
+  const MeshView& onto_;
+  const CarryRun& run_;
+
+  double scale_ = 1;
+  HugeVector<uint32_t> twins_;     // of the new simplices
+  std::vector<bool> has_twin_;     // of the old simplices
+  ChangedSimplices<D> changed_;    // of the new simplices
+  HugeVector<double> volumes_;     // of the new simplices
+  HugeVector<double> covered_;     // of the new simplices: the volume that old ones have
+  HugeVector<double> masses_;      // new simplices x components
+  HugeVector<double> low_, high_;  // of the values that the masses are made of
+};
+
+template <int D>
+uint64_t MeanTransfer<D>::Bytes() const {
+  const uint64_t onto = onto_count();
+  return TwinBytes(from_count(), onto, onto_.points.size() / D) + from_count() / 8 +
+         onto * sizeof(double) * (2 + 4 * field_.components) +
+         // A block has few old simplices, which have few parts each, or overlap all new ones.
+         2 * onto * sizeof(Part) + ChangedSimplices<D>::BytesFor(onto, onto_.points.size() / D);
+}
+
+template <int D>
+double MeanTransfer<D>::VolumeOf(const Simplex<D>& corners) const {
+  Simplex<D> differences;
+  Differences<D>(corners, corners[0], scale_, &differences);
+  return std::max(0.0, CornerVolume<D>(differences, 0));
+}
+
+template <int D>
+absl::Status MeanTransfer<D>::Prepare() {
+  WELLSPACE_ASSIGN_OR_RETURN(twins_, TwinSearch<D>(from_, onto_, run_.context).Run());
+  has_twin_.assign(from_count(), false);
+  for (const uint32_t twin : twins_) {
+    if (twin != kNoSimplex) {
+      has_twin_[twin] = true;
+    }
+  }
+  double largest = 0;
+  for (const MeshView& mesh : {from_, onto_}) {
+    for (const double x : mesh.points) {
+      largest = std::max(largest, std::abs(x));
+    }
+  }
+  scale_ = ScaleOf(largest);
+  WELLSPACE_RETURN_IF_ERROR(changed_.Find(
+      onto_, [&](size_t t) { return twins_[t] == kNoSimplex; }, run_.context));
+  volumes_.resize(onto_count());
+  for (size_t t = 0; t < onto_count(); ++t) {
+    if (t % kStepsBetweenChecks == 0) {
+      WELLSPACE_RETURN_IF_ERROR(run_.context.Check());
+    }
+    volumes_[t] = VolumeOf(CornersOf<D>(onto_, t));
+  }
+  covered_.assign(onto_count(), 0);
+  masses_.assign(onto_count() * field_.components, 0);
+  low_.assign(masses_.size(), std::numeric_limits<double>::infinity());
+  high_.assign(masses_.size(), -std::numeric_limits<double>::infinity());
+  return absl::OkStatus();
+}
+
+template <int D>
+absl::Status MeanTransfer<D>::Distribute() {
+  ThreadTeam team(run_.threads);
+  std::vector<PartsOfBlock> blocks(team.threads() * kBlocksOfAThread);
+  for (size_t begin = 0; begin < from_count(); begin += blocks.size() * kSimplicesOfABlock) {
+    const auto first_of = [&](size_t block) { return std::min(from_count(), begin + block * kSimplicesOfABlock); };
+    WELLSPACE_RETURN_IF_ERROR(team.TryForEach(
+        blocks.size(), [&](size_t block) { return FillBlock(first_of(block), first_of(block + 1), &blocks[block]); }));
+    // In their order, so that sums are the same on any number of threads.
+    for (size_t block = 0; block < blocks.size(); ++block) {
+      size_t part = 0;
+      for (size_t s = first_of(block); s < first_of(block + 1); ++s) {
+        const size_t end = blocks[block].ends[s - first_of(block)];
+        WELLSPACE_RETURN_IF_ERROR(HandOut(s, std::span(blocks[block].parts).subspan(part, end - part)));
+        part = end;
+      }
+    }
+  }
+  return absl::OkStatus();
+}
+
+template <int D>
+absl::Status MeanTransfer<D>::FillBlock(size_t begin, size_t end, PartsOfBlock* block) const {
+  block->parts.clear();
+  block->ends.clear();
+  for (size_t s = begin; s < end; ++s) {
+    if (s % kSimplicesBetweenChecks == 0) {
+      WELLSPACE_RETURN_IF_ERROR(run_.context.Check());
+    }
+    if (!has_twin_[s]) {
+      FindParts(s, &block->parts);
+    }
+    block->ends.push_back(block->parts.size());
+  }
+  return absl::OkStatus();
+}
+
+template <int D>
+void MeanTransfer<D>::FindParts(size_t s, std::vector<Part>* parts) const {
+  const Simplex<D> corners = CornersOf<D>(from_, s);
+  const double volume = VolumeOf(corners);
+  if (!(volume > 0)) {
+    return;
+  }
+  Box<D> box{corners[0], corners[0]};
+  for (const Point<D>& corner : corners) {
+    box.Include(Box<D>{corner, corner});
+  }
+  const size_t first = parts->size();
+  double sum = 0;
+  changed_.locator.ForEachNear(box, [&](uint32_t k) {
+    if (run_.context.IsCancelled()) {  // one may overlap all new ones
+      return;
+    }
+    const uint32_t t = changed_.numbers[k];
+    const Simplex<D> other = CornersOf<D>(onto_, t);
+    // The smaller one is cut: its corners are near its own, so that its heights are exact.
+    const double part =
+        volumes_[t] < volume ? PartInside<D>(other, corners) * (volumes_[t] / volume) : PartInside<D>(corners, other);
+    if (part > kLeastPart || part * volume > kLeastPart * volumes_[t]) {
+      parts->push_back({t, part});
+      sum += part;
+    }
+  });
+  if (sum >= 1 - kUncovered) {
+    for (size_t k = first; k < parts->size(); ++k) {
+      (*parts)[k].part /= sum;
+    }
+  }
+}
+
+template <int D>
+absl::Status MeanTransfer<D>::HandOut(size_t s, std::span<const Part> parts) {
+  const double volume = parts.empty() ? 0 : VolumeOf(CornersOf<D>(from_, s));
+  for (size_t k = 0; k < parts.size(); ++k) {
+    if (k % kPartsBetweenChecks == 0) {
+      WELLSPACE_RETURN_IF_ERROR(run_.context.Check());
+    }
+    const Part& part = parts[k];
+    const double share = part.part * volume;
+    covered_[part.simplex] += share;
+    for (size_t c = 0; c < field_.components; ++c) {
+      const size_t at = part.simplex * field_.components + c;
+      const double value = field_.values[s * field_.components + c];
+      masses_[at] += share * value;
+      low_[at] = std::min(low_[at], value);
+      high_[at] = std::max(high_[at], value);
+    }
+  }
+  return absl::OkStatus();
+}
+
+template <int D>
+absl::StatusOr<CarriedField> MeanTransfer<D>::Finish() {
+  CarriedField carried;
+  carried.values.resize(masses_.size());
+  std::vector<uint32_t> outside;
+  for (size_t t = 0; t < onto_count(); ++t) {
+    if (t % kStepsBetweenChecks == 0) {
+      WELLSPACE_RETURN_IF_ERROR(run_.context.Check());
+    }
+    const bool has_twin = twins_[t] != kNoSimplex;
+    if (!has_twin && !(covered_[t] > 0)) {
+      outside.push_back(static_cast<uint32_t>(t));
+      continue;
+    }
+    // Of one that reaches beyond the old mesh, the mean over the part within it.
+    const bool is_covered = volumes_[t] > 0 && covered_[t] >= (1 - kUncovered) * volumes_[t];
+    const double divisor = is_covered ? volumes_[t] : covered_[t];
+    for (size_t at = t * field_.components; at < (t + 1) * field_.components; ++at) {
+      carried.values[at] = has_twin ? field_.values[twins_[t] * field_.components + (at - t * field_.components)]
+                                    : std::clamp(masses_[at] / divisor, low_[at], high_[at]);
+    }
+  }
+  carried.outside_count = outside.size();
+  WELLSPACE_RETURN_IF_ERROR(FillOutside(outside, &carried));
+  return carried;
+}
+
+template <int D>
+absl::Status MeanTransfer<D>::FillOutside(const std::vector<uint32_t>& outside, CarriedField* carried) const {
+  if (outside.empty()) {
+    return absl::OkStatus();
+  }
+  WELLSPACE_RETURN_IF_ERROR(run_.context.AllowMemory(run_.held_bytes + Bytes() + Locator<D>::BytesFor(from_count())));
+  WELLSPACE_ASSIGN_OR_RETURN(const Locator<D> locator, Locator<D>::Create(from_.points, from_.simplices, run_.context));
+  for (size_t k = 0; k < outside.size(); ++k) {
+    if (k % kSimplicesBetweenChecks == 0) {
+      WELLSPACE_RETURN_IF_ERROR(run_.context.Check());
+    }
+    const Point<D> centroid = CentroidOf<D>(CornersOf<D>(onto_, outside[k]));
+    double distance = 0;
+    const PlaceInSimplex<D> place = locator.Locate(centroid);
+    const uint32_t simplex = place.simplex != kNoSimplex ? place.simplex : locator.Nearest(centroid, &distance).simplex;
+    std::copy_n(&field_.values[simplex * field_.components], field_.components,
+                &carried->values[outside[k] * field_.components]);
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+template <int D>
+absl::StatusOr<CarriedField> CarryMeans(const Field& field, const MeshView& from, const MeshView& onto,
+                                        const CarryRun& run) {
+  return MeanTransfer<D>(field, from, onto, run).Run();
+}
+
+template absl::StatusOr<CarriedField> CarryMeans<2>(const Field&, const MeshView&, const MeshView&, const CarryRun&);
+template absl::StatusOr<CarriedField> CarryMeans<3>(const Field&, const MeshView&, const MeshView&, const CarryRun&);
+
+}  // namespace wellspace::core

@@ -1,0 +1,202 @@
+// The vertices and simplices that two meshes of one session have in common.
+#ifndef WELLSPACE_CORE_MESH_KEPT_PARTS_H_
+#define WELLSPACE_CORE_MESH_KEPT_PARTS_H_
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "core/base/memory/huge_pages.h"
+#include "core/base/run_context.h"
+#include "core/base/status_macros.h"
+#include "core/mesh/carry_field.h"
+#include "core/simplex/locator.h"
+
+namespace wellspace::core {
+
+// Whether vertex `v` is in both meshes, under this number and with the same bits.
+template <int D>
+bool IsKept(std::span<const double> from, std::span<const double> onto, size_t v) {
+  const size_t end = (v + 1) * D;
+  return end <= from.size() && end <= onto.size() && std::memcmp(&from[v * D], &onto[v * D], D * sizeof(double)) == 0;
+}
+
+// Finds the simplices that two meshes have in common.
+template <int D>
+class TwinSearch {
+ public:
+  TwinSearch(const MeshView& from, const MeshView& onto, const RunContext& context)
+      : from_(from), onto_(onto), context_(context) {}
+
+  // For each simplex of `onto` the one of `from` that has the same vertices, all of them kept; kNoSimplex for others.
+  //
+  // Complexity: O(n), for vertices of few simplices each.
+  // Errors:     CANCELLED, DEADLINE_EXCEEDED.
+  absl::StatusOr<HugeVector<uint32_t>> Run() {
+    WELLSPACE_RETURN_IF_ERROR(FindKept());
+    WELLSPACE_RETURN_IF_ERROR(MatchInOrder());
+    WELLSPACE_RETURN_IF_ERROR(MatchOthers());
+    return std::move(twins_);
+  }
+
+ private:
+  using Corners = std::array<uint32_t, D + 1>;
+
+  static Corners RowOf(const MeshView& mesh, size_t i) {
+    Corners corners;
+    std::copy_n(&mesh.simplices[i * (D + 1)], D + 1, corners.begin());
+    return corners;
+  }
+  static Corners SortedRowOf(const MeshView& mesh, size_t i) {
+    Corners corners = RowOf(mesh, i);
+    std::ranges::sort(corners);
+    return corners;
+  }
+  bool AreKept(const Corners& corners) const {
+    return std::ranges::all_of(corners, [&](uint32_t v) { return v < is_kept_.size() && is_kept_[v] != 0; });
+  }
+  size_t from_count() const { return from_.simplices.size() / (D + 1); }
+  absl::Status CheckAt(size_t i) const { return i % kStepsBetweenChecks == 0 ? context_.Check() : absl::OkStatus(); }
+
+  absl::Status FindKept();
+  // A mesh that was updated has the simplices that it keeps in their order, with those that are gone left out.
+  absl::Status MatchInOrder();
+  // Those that are left, by their lowest vertex.
+  absl::Status MatchOthers();
+  absl::Status SortByVertex();
+
+  const MeshView& from_;
+  const MeshView& onto_;
+  const RunContext& context_;
+  HugeVector<uint8_t> is_kept_;     // of the vertices of both
+  HugeVector<uint32_t> twins_;      // the result
+  std::vector<bool> is_matched_;    // of `from`
+  HugeVector<uint32_t> by_vertex_;  // simplices of `from` that are not matched, by their lowest vertex
+  HugeVector<uint32_t> ends_;       // of each vertex in by_vertex_
+};
+
+template <int D>
+absl::Status TwinSearch<D>::FindKept() {
+  is_kept_.resize(std::min(from_.points.size(), onto_.points.size()) / D);
+  for (size_t v = 0; v < is_kept_.size(); ++v) {
+    WELLSPACE_RETURN_IF_ERROR(CheckAt(v));
+    is_kept_[v] = IsKept<D>(from_.points, onto_.points, v) ? 1 : 0;
+  }
+  return absl::OkStatus();
+}
+
+template <int D>
+absl::Status TwinSearch<D>::MatchInOrder() {
+  twins_.assign(onto_.simplices.size() / (D + 1), kNoSimplex);
+  is_matched_.assign(from_count(), false);
+  size_t next = 0;
+  size_t steps = 0;  // over simplices that are gone: in meshes that were made anew there is no end of them
+  for (size_t i = 0; i < twins_.size() && next < from_count() && steps <= 2 * from_count(); ++i) {
+    WELLSPACE_RETURN_IF_ERROR(CheckAt(i));
+    const Corners corners = RowOf(onto_, i);
+    if (!AreKept(corners)) {
+      continue;
+    }
+    size_t found = next;
+    while (found < from_count() && steps <= 2 * from_count() && RowOf(from_, found) != corners) {
+      WELLSPACE_RETURN_IF_ERROR(CheckAt(steps));
+      ++found;
+      ++steps;
+    }
+    if (found < from_count() && RowOf(from_, found) == corners) {
+      twins_[i] = static_cast<uint32_t>(found);
+      is_matched_[found] = true;
+      next = found + 1;
+    }
+  }
+  return absl::OkStatus();
+}
+
+template <int D>
+absl::Status TwinSearch<D>::SortByVertex() {
+  ends_.assign(is_kept_.size() + 1, 0);
+  by_vertex_.resize(from_count());
+  for (const bool is_counting : {true, false}) {
+    for (size_t i = 0; i < from_count(); ++i) {
+      WELLSPACE_RETURN_IF_ERROR(CheckAt(i));
+      if (is_matched_[i] || !AreKept(RowOf(from_, i))) {
+        continue;
+      }
+      const uint32_t lowest = SortedRowOf(from_, i)[0];
+      if (is_counting) {
+        ++ends_[lowest + 1];
+      } else {
+        by_vertex_[ends_[lowest]++] = static_cast<uint32_t>(i);
+      }
+    }
+    for (size_t v = 1; is_counting && v < ends_.size(); ++v) {
+      ends_[v] += ends_[v - 1];
+    }
+  }
+  return absl::OkStatus();
+}
+
+template <int D>
+absl::Status TwinSearch<D>::MatchOthers() {
+  WELLSPACE_RETURN_IF_ERROR(SortByVertex());
+  for (size_t i = 0; i < twins_.size(); ++i) {
+    WELLSPACE_RETURN_IF_ERROR(CheckAt(i));
+    if (twins_[i] != kNoSimplex || !AreKept(RowOf(onto_, i))) {
+      continue;
+    }
+    const Corners corners = SortedRowOf(onto_, i);
+    for (size_t k = corners[0] == 0 ? 0 : ends_[corners[0] - 1]; k < ends_[corners[0]]; ++k) {
+      if (SortedRowOf(from_, by_vertex_[k]) == corners) {
+        twins_[i] = by_vertex_[k];
+        break;
+      }
+    }
+  }
+  return absl::OkStatus();
+}
+
+// The simplices of a mesh that the other one has not, and a locator over them. Whatever is new in the other mesh lies
+// in these: a simplex that both meshes have is itself there.
+template <int D>
+struct ChangedSimplices {
+  HugeVector<uint32_t> numbers{};    // in the mesh, ascending
+  HugeVector<uint32_t> simplices{};  // their vertices
+  Locator<D> locator{};              // over them; refers to `simplices` and to the points of the mesh
+
+  // `is_changed(i)`: whether the simplex `i` is one.
+  template <typename IsChanged>
+  absl::Status Find(const MeshView& mesh, const IsChanged& is_changed, const RunContext& context) {
+    const size_t count = mesh.simplices.size() / (D + 1);
+    for (size_t i = 0; i < count; ++i) {
+      if (i % kStepsBetweenChecks == 0) {
+        WELLSPACE_RETURN_IF_ERROR(context.Check());
+      }
+      if (is_changed(i)) {
+        numbers.push_back(static_cast<uint32_t>(i));
+        simplices.insert(simplices.end(), &mesh.simplices[i * (D + 1)], &mesh.simplices[i * (D + 1)] + D + 1);
+      }
+    }
+    WELLSPACE_ASSIGN_OR_RETURN(locator, Locator<D>::Create(mesh.points, simplices, context));
+    return absl::OkStatus();
+  }
+
+  // The memory that it takes for this number of simplices, and vertices of the mesh. Unit: bytes. Vectors grow by
+  // doubling.
+  static uint64_t BytesFor(uint64_t simplices, uint64_t vertices) {
+    return simplices * 2 * (D + 2) * sizeof(uint32_t) + Locator<D>::BytesFor(simplices) + vertices * sizeof(uint64_t);
+  }
+};
+
+// The memory that TwinSearch takes, its result included. Unit: bytes.
+inline uint64_t TwinBytes(uint64_t from_simplices, uint64_t onto_simplices, uint64_t vertices) {
+  return (from_simplices + onto_simplices) * sizeof(uint32_t) + from_simplices / 8 + vertices * (sizeof(uint32_t) + 1);
+}
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_MESH_KEPT_PARTS_H_
