@@ -292,6 +292,10 @@ absl::Status DownloadCommand::Download(client::Client& client, const client::Cal
   if (output.no_boundary) {
     file.LeaveOutBoundary();
   }
+  if (formats::HasPlaceForPairs(output.path, output.format)) {
+    WELLSPACE_ASSIGN_OR_RETURN(const client::Session found, client.GetSession(session, call));
+    file.SetPeriodicAxes(found.parameters.periodic_axes);
+  }
   {
     ProgressBar bar(!remote.quiet() && !remote.json());
     const absl::Status status = client.DownloadMesh(
