@@ -139,6 +139,7 @@ struct MeshOptions {
   std::vector<double> domain_low;
   std::vector<double> domain_high;
   double margin = 0.25;
+  std::vector<int> periodic_axes;  // along which opposite faces of the box match, each once
   std::optional<uint64_t> max_vertices;
   std::optional<int> threads;
   std::shared_ptr<const Features>

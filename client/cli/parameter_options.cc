@@ -9,12 +9,14 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "absl/strings/str_split.h"
 #include "client/cli/json.h"
 #include "client/cli/length.h"
 #include "client/cli/options.h"
 #include "client/cli/size_field_options.h"
 #include "client/error_details.h"
 #include "client/formats/cloud.h"
+#include "client/formats/io/number.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::cli {
@@ -22,6 +24,9 @@ namespace {
 
 constexpr client::Criterion kRadiusEdge = client::Criterion::kRadiusEdge;
 constexpr client::Criterion kWellSpaced = client::Criterion::kWellSpaced;
+constexpr char kPeriodic[] = "--periodic";
+constexpr std::string_view kPeriodicAxes = "periodic_axes";
+constexpr std::string_view kAxes = "xyz";
 constexpr char kTolerance[] = "--tolerance";
 constexpr char kFacetLength[] = "--facet-length";
 constexpr char kMinFacetAngle[] = "--min-facet-angle";
@@ -80,6 +85,23 @@ absl::StatusOr<std::vector<client::SizeBox>> SizeBoxesOf(const std::vector<std::
   return boxes;
 }
 
+void AddPeriodic(CLI::App& command, std::vector<int>& axes, const std::string& description) {
+  const auto parse = [&axes](const std::string& text) {
+    axes.clear();
+    for (const std::string& name : std::vector<std::string>(absl::StrSplit(text, ','))) {
+      const size_t axis = kAxes.find(name);
+      if (name.size() != 1 || axis == std::string_view::npos) {
+        throw CLI::ValidationError(kPeriodic, absl::StrCat("expected axes out of x, y and z with commas between, as "
+                                                           "x,y, got ",
+                                                           formats::Quote(text)));
+      }
+      axes.push_back(static_cast<int>(axis));
+    }
+    std::sort(axes.begin(), axes.end());
+  };
+  command.add_option_function<std::string>(kPeriodic, parse, description)->type_name("AXES");
+}
+
 void ParameterOptions::AddSpaceTo(CLI::App& command) {
   command.add_option("--dimension", dimension_, "Dimension; default: as many as the points have coordinates")
       ->check(CLI::Range(formats::kMinDimension, formats::kMaxDimension));
@@ -92,6 +114,11 @@ void ParameterOptions::AddSpaceTo(CLI::App& command) {
             "Points no farther than this from another one become that one's vertex, and ends of segments with them: a "
             "length, or a share of the longest side of the points' bounding box, as 0.01%; default: equal ones, and "
             "corners of polygons that doubles cannot tell apart");
+  AddPeriodic(
+      command, options_.periodic_axes,
+      "Axes along which the box is periodic, as x or x,y: for each vertex on one of two opposite sides there is "
+      "one on the other, and the facets on both match; in 2-D and 3-D, for points without segments or "
+      "triangles; default: none");
 }
 
 void ParameterOptions::AddQualityTo(CLI::App& command) {
@@ -278,6 +305,9 @@ std::string ParameterOptions::OptionOf(const std::string& field) const {
   }
   if (name == "merge_distance") {
     return "--merge";
+  }
+  if (name.compare(0, kPeriodicAxes.size(), kPeriodicAxes) == 0) {
+    return kPeriodic;
   }
   for (const auto& [of_surface, option] : {std::pair<const char*, const char*>("surface.tolerance", kTolerance),
                                            {"surface.edge_length", kFacetLength},

@@ -25,10 +25,13 @@ void AddSizes(CLI::App& command, std::optional<double>& max_circumradius, std::v
 absl::StatusOr<std::vector<client::SizeBox>> SizeBoxesOf(const std::vector<std::vector<double>>& size_boxes,
                                                          int dimension);
 
+// --periodic, axes by their letters.
+void AddPeriodic(CLI::App& command, std::vector<int>& axes, const std::string& description);
+
 // Thread safety: thread-compatible.
 class ParameterOptions {
  public:
-  // Adds --dimension, --domain and --margin. REQUIRES: this outlives `command`, here and below.
+  // Adds --dimension, --domain, --margin, --merge and --periodic. REQUIRES: this outlives `command`, here and below.
   void AddSpaceTo(CLI::App& command);
   // Adds the others.
   void AddQualityTo(CLI::App& command);

@@ -91,6 +91,7 @@ absl::Status MeshFile::Begin(const MeshHeader& header) {
       .regions = {},
       .low = header.domain_low,
       .high = header.domain_high,
+      .periodic_axes = periodic_axes_,
       .ridge_count = header.ridge_count,
       .order = order_,
   };

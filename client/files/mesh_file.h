@@ -79,6 +79,10 @@ class MeshFile final : public MeshSink {
   // REQUIRES:   `attributes` outlive this.
   void AddAttributes(std::span<const formats::PointAttribute> attributes) { attributes_ = attributes; }
 
+  // The mesh is periodic along these axes: the file gets the pairs of vertices, if the format has a place for them. To
+  // be called before Begin.
+  void SetPeriodicAxes(std::vector<int> axes) { periodic_axes_ = std::move(axes); }
+
   // Gives parts of the boundary that have these tags, of markers, these names in the place of the server's. To be
   // called before Begin.
   void NameParts(std::map<int32_t, std::string> names) { part_names_ = std::move(names); }
@@ -102,6 +106,7 @@ class MeshFile final : public MeshSink {
   formats::MeshOrder order_ = formats::MeshOrder::kFirst;
   bool has_boundary_ = true;
   std::map<int32_t, std::string> part_names_;
+  std::vector<int> periodic_axes_;
   std::span<const formats::PointAttribute> attributes_;
   std::vector<uint32_t> origins_;  // of vertices, if the file gets attributes
   bool has_attributes_ = false;    // the file

@@ -71,6 +71,7 @@ struct MeshShape {
   std::vector<Region> regions{};         // empty: nothing is told of regions
   std::vector<double> low{};             // of the mesh's box; may be missing where there is no boundary
   std::vector<double> high{};
+  std::vector<int> periodic_axes{};       // ascending: vertices across them are pairs; with a box, up to 3-D
   uint64_t ridge_count = 0;               // edges along the creases of a surface
   std::vector<std::string> attributes{};  // of vertices: names as of NamesToWrite
   const PartNumbers* part = nullptr;      // of a part of a larger mesh; outlives the writer; null: it is whole
@@ -99,6 +100,7 @@ struct MeshView {
   std::span<const uint32_t> ridges{};          // ridge_count x 2: edges of facets along creases, in 3-D; or none
   std::span<const int32_t> simplex_regions{};  // simplex_count ids; empty: all are of the only region
   std::span<const Region> regions{};
+  std::span<const int> periodic_axes{};          // see MeshShape
   std::span<const PointAttribute> attributes{};  // of vertices
   const PartNumbers* part = nullptr;             // see MeshShape
   MeshOrder order = MeshOrder::kFirst;           // see MeshShape
@@ -115,11 +117,13 @@ struct MeshView {
                     .boundary = {boundary.begin(), boundary.end()},
                     .has_simplex_regions = !simplex_regions.empty(),
                     .regions = {regions.begin(), regions.end()},
+                    .periodic_axes = {periodic_axes.begin(), periodic_axes.end()},
                     .ridge_count = ridges.size() / 2,
                     .attributes = NamesToWrite(attributes),
                     .part = part,
                     .order = order};
-    for (size_t i = 0; i < points.size() && !boundary.empty(); ++i) {
+    const bool has_box = !boundary.empty() || !periodic_axes.empty();
+    for (size_t i = 0; i < points.size() && has_box; ++i) {
       const size_t axis = i % dimension;
       if (i < static_cast<size_t>(dimension)) {
         shape.low.push_back(points[i]);

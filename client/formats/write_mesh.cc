@@ -31,6 +31,7 @@ enum PlaceFor : uint32_t {
   kForParts = 8,
   kForRidges = 16,
   kForSecondOrder = 32,
+  kForPairs = 64,
 };
 
 struct WriterKind {
@@ -46,7 +47,8 @@ struct WriterKind {
 };
 
 constexpr uint32_t kForDataOfVtk = kForWeights | kForAttributes | kForRegions | kForSecondOrder;
-constexpr uint32_t kForDataOfMsh = kForWeights | kForRegions | kForSecondOrder;
+constexpr uint32_t kForDataOfTetgen = kForWeights | kForRegions | kForSecondOrder;
+constexpr uint32_t kForDataOfMsh = kForDataOfTetgen | kForPairs;
 
 std::span<const Format<WriterKind>> Writers() {
   static const std::vector<Format<WriterKind>> writers = {
@@ -59,7 +61,7 @@ std::span<const Format<WriterKind>> Writers() {
       {.name = "npz",
        .extensions = {".npz"},
        .handler = {.create = CreateNpz,
-                   .places = kForDataOfVtk | kForParts | kForRidges,
+                   .places = kForDataOfVtk | kForParts | kForRidges | kForPairs,
                    .max_dimension = kMaxDimension,
                    .needs_file = "npz is a zip archive, completed from its start"}},
       {.name = "msh41", .extensions = {".msh"}, .handler = {.create = CreateMsh41, .places = kForDataOfMsh}},
@@ -70,7 +72,7 @@ std::span<const Format<WriterKind>> Writers() {
       {.name = "node",
        .extensions = {".node", ".ele"},
        .handler = {.create = CreateNodeAndEle,
-                   .places = kForDataOfMsh,
+                   .places = kForDataOfTetgen,
                    .max_dimension = kMaxDimension,
                    .needs_file = "node is a pair of files",
                    .files = TetgenFilesOf}},
@@ -127,6 +129,11 @@ std::vector<std::string> LossesOf(const WriterKind& kind, const MeshShape& shape
       names.push_back(region.name.empty() ? absl::StrCat(region.id) : region.name);
     }
     notes.push_back(absl::StrCat("the format has no place for regions, which are left out: ", Joined(names)));
+  }
+  if (!shape.periodic_axes.empty() && !kind.HasPlace(kForPairs)) {
+    notes.push_back(absl::StrCat(
+        "the format has no place for the pairs of vertices across periodic axes, which are left out; those have one: ",
+        FormatsWith(kForPairs)));
   }
   return notes;
 }
@@ -201,6 +208,11 @@ bool HasPlaceForAttributes(const std::string& path, const std::string& format) {
   return writer.ok() && writer->HasPlace(kForAttributes);
 }
 
+bool HasPlaceForPairs(const std::string& path, const std::string& format) {
+  const absl::StatusOr<WriterKind> writer = FindWriter(path, format, /*dimension=*/0, /*has_weights=*/false);
+  return writer.ok() && writer->HasPlace(kForPairs);
+}
+
 std::vector<std::string> FilesOfMeshWritten(const std::string& path, const std::string& format) {
   const absl::StatusOr<WriterKind> writer = FindWriter(path, format, /*dimension=*/0, /*has_weights=*/false);
   return writer.ok() && writer->files != nullptr ? writer->files(path) : std::vector<std::string>{path};
@@ -266,10 +278,30 @@ MeshShape HeldShape(const WriterKind& writer, const MeshShape& shape) {
   if (!writer.HasPlace(kForRidges)) {
     held.ridge_count = 0;
   }
+  if (!writer.HasPlace(kForPairs)) {
+    held.periodic_axes.clear();
+  }
   return held;
 }
 
+// Pairs are of a box with so many axes.
+absl::Status CheckAxes(const std::string& path, const MeshShape& shape) {
+  for (size_t i = 0; i < shape.periodic_axes.size(); ++i) {
+    const int axis = shape.periodic_axes[i];
+    if (axis < 0 || axis >= std::min(shape.dimension, 3) || (i > 0 && axis <= shape.periodic_axes[i - 1])) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          "cannot write ", path, ": periodic axes ", absl::StrJoin(shape.periodic_axes, ", "), " of a mesh in ",
+          shape.dimension, "-D; expected axes from 0 to ", std::min(shape.dimension, 3) - 1, ", ascending"));
+    }
+  }
+  return shape.periodic_axes.empty() || shape.low.size() == static_cast<size_t>(shape.dimension)
+             ? absl::OkStatus()
+             : absl::InvalidArgumentError(
+                   absl::StrCat("cannot write ", path, ": a mesh without a box is not periodic"));
+}
+
 absl::StatusOr<WriterKind> FindWriterFor(const std::string& path, const std::string& format, const MeshShape& shape) {
+  WELLSPACE_RETURN_IF_ERROR(CheckAxes(path, shape));
   WELLSPACE_ASSIGN_OR_RETURN(const WriterKind writer,
                              FindWriter(path, format, shape.dimension, shape.has_weights, shape.order));
   if (shape.part != nullptr && !writer.HasPlace(kForParts)) {

@@ -58,6 +58,11 @@
 // `vertex_rows`, `simplex_ids`, `simplex_owners`, `facet_ids`, and `part`: the numbers of the part, of parts, of own
 // vertices and of own simplices.
 //
+// Of a mesh with periodic axes each vertex on the low side across one has its partner on the high side. msh41, msh22:
+// $Periodic, of the entity of each high side its nodes, the low side's, and the translation; they go with the boundary,
+// which has these entities. npz: `periodic_x`, `periodic_y`, `periodic_z`, a row for each pair, the vertex of the low
+// side first, by ascending such. Middle nodes of second order are paired as well.
+//
 // Edges along the creases of a surface are `ridges` of npz, and Edges that Ridges names of medit.
 //
 // Of second order (MeshOrder) vertices are followed by the nodes at the middles of edges, ordered by the ends of these,
@@ -100,6 +105,9 @@ std::string ExtensionOfMesh(const std::string& format);
 // Whether a mesh in `path` and `format` has attributes of its vertices.
 bool HasPlaceForAttributes(const std::string& path, const std::string& format);
 
+// Whether a mesh in `path` and `format` has the pairs of its vertices across periodic axes.
+bool HasPlaceForPairs(const std::string& path, const std::string& format);
+
 // The files that WriteMesh makes of `path` and `format`: that one, or a pair. A format that cannot be written is taken
 // for one file.
 std::vector<std::string> FilesOfMeshWritten(const std::string& path, const std::string& format);
@@ -112,11 +120,12 @@ absl::Status CheckMeshOutput(const std::string& path, const std::string& format,
 // Writes a mesh piece by piece, so that it need not fit into memory.
 //
 // Memory: a few blocks for a regular file; for vtu into a pipe or a device the compressed array that is being written;
-//         for node with weights or tags of vertices the points, for msh41 and msh22 with weights these. With several
-//         regions, for msh41, msh22, medit and node also 16 bytes for each run of simplices of one region; for msh41
-//         into a pipe or a device the simplices, and otherwise 4 KiB a region. For vtk all data of vertices; for abaqus
-//         the points, the facets, and the simplices that may have one. Of second order the mesh, and for the edges 24
-//         bytes a tetrahedron or 12 a triangle, and 8 a vertex: the file appears with Commit alone.
+//         with periodic axes, for msh and npz, what PeriodicPairs says; for node with weights or tags of vertices the
+//         points, for msh41 and msh22 with weights these. With several regions, for msh41, msh22, medit and node also
+//         16 bytes for each run of simplices of one region; for msh41 into a pipe or a device the simplices, and
+//         otherwise 4 KiB a region. For vtk all data of vertices; for abaqus the points, the facets, and the simplices
+//         that may have one. Of second order the mesh, and for the edges 24 bytes a tetrahedron or 12 a triangle, and 8
+//         a vertex: the file appears with Commit alone.
 // Thread safety: thread-compatible.
 class MeshWriter {
  public:

@@ -281,6 +281,7 @@ void SetParameters(const MeshOptions& options, v1::MeshParameters* parameters) {
   parameters->set_pump_weights(options.pump_weights);
   set(options.merge_distance, &v1::MeshParameters::set_merge_distance);
   parameters->set_keep_vertices(options.keep_vertices);
+  parameters->mutable_periodic_axes()->Assign(options.periodic_axes.begin(), options.periodic_axes.end());
   SetSurface(options.surface_parameters, parameters);
   parameters->set_margin(options.margin);
   set(options.max_vertices, &v1::MeshParameters::set_max_vertices);
@@ -305,6 +306,7 @@ MeshOptions OptionsFromProto(const v1::MeshParameters& parameters) {
   options.pump_weights = parameters.pump_weights();
   options.merge_distance = get(parameters.has_merge_distance(), parameters.merge_distance());
   options.keep_vertices = parameters.keep_vertices();
+  options.periodic_axes.assign(parameters.periodic_axes().begin(), parameters.periodic_axes().end());
   const v1::SurfaceParameters& surface = parameters.surface();
   options.surface_parameters = {
       .tolerance = get(surface.has_tolerance(), surface.tolerance()),

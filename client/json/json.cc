@@ -121,6 +121,7 @@ Json ParametersJson(const MeshOptions& parameters) {
   json["domain_high"] = has_domain ? Json(parameters.domain_high) : Json(nullptr);
   json["margin"] = parameters.margin;
   json["merge_distance"] = OrNull(parameters.merge_distance);
+  json["periodic_axes"] = parameters.periodic_axes;
   json["max_vertices"] = OrNull(parameters.max_vertices);
   json["threads"] = OrNull(parameters.threads);
   return json;

@@ -104,6 +104,36 @@ absl::Status CheckSurface(const SurfaceParameters& surface, int dimension) {
   return absl::OkStatus();
 }
 
+absl::Status CheckPeriodicAxes(const MeshParameters& parameters) {
+  const std::vector<int>& axes = parameters.periodic_axes;
+  const int dimension = parameters.dimension;
+  if (axes.empty()) {
+    return absl::OkStatus();
+  }
+  if (dimension > kMostPeriodicDimension) {
+    return absl::InvalidArgumentError(absl::StrCat("periodic_axes: they are not allowed in ", dimension,
+                                                   "-D; boxes are periodic in 2-D and ", kMostPeriodicDimension, "-D"));
+  }
+  for (size_t i = 0; i < axes.size(); ++i) {
+    if (axes[i] < 0 || axes[i] >= dimension) {
+      return absl::InvalidArgumentError(absl::StrCat("periodic_axes[", i, "]: ", axes[i], " is no axis in ", dimension,
+                                                     "-D; 0 to ", dimension - 1, " are"));
+    }
+    const auto first = std::find(axes.begin(), axes.begin() + static_cast<std::ptrdiff_t>(i), axes[i]);
+    if (first != axes.begin() + static_cast<std::ptrdiff_t>(i)) {
+      return absl::InvalidArgumentError(absl::StrCat("periodic_axes[", i, "]: axis ", axes[i],
+                                                     " is there already, as periodic_axes[", first - axes.begin(),
+                                                     "]; give each axis once"));
+    }
+  }
+  if (parameters.pump_weights) {
+    return absl::InvalidArgumentError(
+        "pump_weights: true is not allowed with periodic_axes, since weights would differ across the box; leave one of "
+        "the two out");
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 double DefaultRho(int dimension) {
@@ -169,6 +199,7 @@ absl::Status ValidateParameters(const MeshParameters& parameters) {
     return absl::InvalidArgumentError(
         absl::StrCat("pump_weights: true is not allowed in ", dimension, "-D, where there are no slivers; false is"));
   }
+  WELLSPACE_RETURN_IF_ERROR(CheckPeriodicAxes(parameters));
   WELLSPACE_RETURN_IF_ERROR(CheckSurface(parameters.surface, dimension));
   return CheckThreads(parameters.threads);
 }

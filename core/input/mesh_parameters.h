@@ -92,6 +92,11 @@ struct MeshParameters {
   // but equal ones. Unit: that of the points.
   double merge_distance = 0;
 
+  // The axes along which the box is periodic, each once: a vertex on one of the two faces across such an axis has an
+  // image on the other, whose other coordinates are the same, and the facets on both match. In 2-D and 3-D, for points
+  // in a box, without pump_weights. Sizes are not mirrored: what they ask for on one face holds on the other as well.
+  std::vector<int> periodic_axes{};
+
   // The run ends with RESOURCE_EXHAUSTED before the mesh has more vertices than this. 0 means kDefaultMaxVertices.
   uint64_t max_vertices = 0;
 
@@ -119,7 +124,11 @@ inline constexpr double kMostMinDihedral = 18;
 // The default of `min_dihedral`: 12 in 3-D, 0 elsewhere.
 double DefaultMinDihedral(int dimension);
 
-// Refuses parameters that no cloud could make valid: dimension, rho, sizes, slivers, surface, domain, margin, threads.
+// The largest dimension in which boxes may be periodic.
+inline constexpr int kMostPeriodicDimension = 3;
+
+// Refuses parameters that no cloud could make valid: dimension, rho, sizes, slivers, surface, domain, margin, periodic
+// axes, threads.
 //
 // Complexity: O(1) for each box and sample.
 // Errors:     INVALID_ARGUMENT, naming the field, its value and what would be accepted.

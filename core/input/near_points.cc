@@ -230,6 +230,9 @@ absl::StatusOr<SortedCloud<D>> SortMerged(const Frame<D>& frame, const MergedPoi
     sorted[input] = i;
     input = merged.inputs[input];
   }
+  for (auto& duplicate : cloud.duplicates) {  // images of points, at others
+    duplicate.input = merged.inputs[duplicate.input];
+  }
   for (uint32_t i = 0; i < merged.place_of.size(); ++i) {
     if (merged.inputs[merged.place_of[i]] != i) {
       cloud.duplicates.push_back({i, sorted[merged.place_of[i]]});

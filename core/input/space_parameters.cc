@@ -17,6 +17,10 @@ absl::Status ValidateSpaceParameters(const MeshParameters& parameters, const Sur
     return absl::InvalidArgumentError(
         absl::StrCat("dimension: triangles bound domains in 3-D alone, and it is ", parameters.dimension));
   }
+  if (!parameters.periodic_axes.empty()) {
+    return absl::InvalidArgumentError(
+        "periodic_axes: a domain with a surface is not periodic; a box of points alone is; leave them out");
+  }
   if (parameters.criterion != Criterion::kRadiusEdge) {
     return absl::InvalidArgumentError("criterion: a domain with a surface has the radius-edge criterion alone");
   }

@@ -23,11 +23,16 @@ absl::Status CheckVertices(std::span<const uint32_t> vertices, uint64_t count) {
 }
 
 template <int D>
-void VertexNumbering<D>::Begin(PointNames names, std::span<const double> points, std::span<const uint32_t> stayed) {
+void VertexNumbering<D>::Begin(PointNames names, std::span<const double> points, std::span<const uint32_t> stayed,
+                               const Images& images) {
   output_index_ = std::move(names.of_sorted);
   input_vertex_ = std::move(names.of_input);
   distinct_count_ = output_index_.size();
   distinct_inputs_ = distinct_count_;
+  first_image_ = distinct_count_;
+  if (images.count > 0) {
+    NumberImages(input_vertex_.size() - images.count, images.corners);
+  }
   for (const uint32_t input : stayed) {
     NoteNegativeZeros(points, input, input_vertex_[input]);
   }
@@ -36,6 +41,22 @@ void VertexNumbering<D>::Begin(PointNames names, std::span<const double> points,
       NoteNegativeZeros(points, i, named++);
     }
   }
+}
+
+// Forgets the inputs from `given` on, and puts the numbers of their points behind those of the corners.
+template <int D>
+void VertexNumbering<D>::NumberImages(size_t given, uint32_t corners) {
+  input_vertex_.resize(given);
+  const auto last = std::max_element(input_vertex_.begin(), input_vertex_.end());
+  distinct_inputs_ = uint64_t{*last} + 1;
+  for (uint32_t& number : output_index_) {
+    number += number >= distinct_inputs_ ? corners : 0;
+  }
+  for (uint32_t i = 0; i < corners; ++i) {
+    output_index_.push_back(static_cast<uint32_t>(distinct_inputs_) + i);
+  }
+  distinct_count_ = output_index_.size();
+  first_image_ = distinct_inputs_ + corners;
 }
 
 template <int D>

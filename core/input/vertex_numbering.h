@@ -35,9 +35,25 @@ class VertexNumbering {
   // Takes the numbers of the first input, `points`. Of these, `stayed` became vertices as they are; it is empty where
   // no points were merged, and the first of equals did.
   //
-  // REQUIRES:   no number has been asked for.
+  // With `images` the last so many of the points that have names are no inputs but images of inputs; their numbers come
+  // after those of the corners of the box, of which `corners` have been added.
+  //
+  // REQUIRES:   no number has been asked for; images after all inputs.
   // Complexity: O(n).
-  void Begin(PointNames names, std::span<const double> points, std::span<const uint32_t> stayed);
+  struct Images {
+    size_t count = 0;
+    uint32_t corners = 0;
+  };
+  void Begin(PointNames names, std::span<const double> points, std::span<const uint32_t> stayed,
+             const Images& images = {0, 0});
+
+  // Calls f(v, number) for the vertices that were added for images of Begin.
+  template <typename F>
+  void ForEachImage(F f) const {
+    for (uint32_t number = first_image_; number < distinct_count_; ++number) {
+      f(VertexOf(number), number);
+    }
+  }
 
   // Tells of vertex `v`, which has been added for input `index` of `points`.
   //
@@ -94,7 +110,10 @@ class VertexNumbering {
  private:
   void NoteNegativeZeros(std::span<const double> points, size_t index, uint32_t vertex);
 
-  uint64_t distinct_count_ = 0;        // distinct points of Begin
+  void NumberImages(size_t given, uint32_t corners);
+
+  uint64_t distinct_count_ = 0;        // distinct points of Begin; where some are images, and the corners of the box
+  uint64_t first_image_ = 0;           // number of the first image; distinct_count_ if there is none
   bool has_left_out_ = false;          // numbers are those of ExtendBut
   HugeVector<uint32_t> output_index_;  // by vertex; of the first distinct_count_ at least
   // By output index, of the first distinct_count_; made when one is first asked for.

@@ -1,14 +1,17 @@
 #include "core/meshers/box_mesher.h"
 
 #include <algorithm>
+#include <bit>
 
 #include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
 #include "core/input/frame.h"
+#include "core/input/point_images.h"
 #include "core/input/separation.h"
 #include "core/mesh/mesh_statistics.h"
 #include "core/meshers/feasibility.h"
 #include "core/meshers/mesh_estimate.h"
+#include "core/meshers/mesher_checks.h"
 #include "core/simplex/boundary.h"
 #include "core/simplex/simplices.h"
 
@@ -23,29 +26,65 @@ Box<D> BoxOf(const std::vector<double>& low, const std::vector<double>& high) {
   return box;
 }
 
+// Adds the images to the points that stayed, as further inputs.
+void AppendImages(PointsWithImages& imaged, MergedPoints& merged) {
+  if (!imaged.HasImages()) {
+    return;
+  }
+  merged.points = std::move(imaged.points);
+  for (size_t i = 0; i < imaged.sources.size(); ++i) {
+    merged.place_of.push_back(static_cast<uint32_t>(merged.inputs.size()));
+    merged.inputs.push_back(static_cast<uint32_t>(merged.place_of.size() - 1));
+  }
+}
+
 }  // namespace
 
 template <int D>
 uint64_t BoxMesher<D>::BuildingBytes(const MeshParameters& parameters, const Input& input) const {
-  return parameters.merge_distance > 0 ? input.points.size() / D * kMergeBytes<D> : 0;
+  const uint64_t points = input.points.size() / D;
+  uint64_t bytes = parameters.merge_distance > 0 ? points * kMergeBytes<D> : 0;
+  if (!parameters.periodic_axes.empty()) {
+    const absl::StatusOr<Box<D>> box = parameters.domain_low.empty()
+                                           ? BoxAround<D>(input.points, parameters.margin, RunContext())
+                                           : BoxOf<D>(parameters.domain_low, parameters.domain_high);
+    const size_t images = box.ok() ? CountImages(PeriodicBox<D>(*box, parameters.periodic_axes), input.points) : 0;
+    // A copy of all, and what each more takes as a point.
+    bytes += images == 0 ? 0 : (points + images) * sizeof(Point<D>) + images * (kTreeBytes<D> + sizeof(Point<D>));
+  }
+  return bytes;
 }
 
 template <int D>
 absl::Status BoxMesher<D>::Build(const MeshParameters& parameters, const Input& input, RunContext& context) {
   const std::span<const double> points = input.points;
   merge_distance_ = parameters.merge_distance;
-  WELLSPACE_ASSIGN_OR_RETURN(const MergedPoints merged, SetBox(parameters, points, context));
+  periodic_axes_ = parameters.periodic_axes;
+  WELLSPACE_ASSIGN_OR_RETURN(MergedPoints merged, SetBox(parameters, points, context));
   meshed_box_ = frame_.box;
   WELLSPACE_RETURN_IF_ERROR(samples_.Take(frame_, parameters, context));
   WELLSPACE_RETURN_IF_ERROR(CheckShapeFeasible<D>(frame_, parameters, points.size() / D));
-  absl::StatusOr<SortedCloud<D>> cloud = SortAndBuild(parameters, points, merged, context);
+  const size_t stayed = merged.inputs.size();
+  WELLSPACE_ASSIGN_OR_RETURN(
+      PointsWithImages imaged,
+      WithImages<D>(PeriodicIn(frame_.box), merge_distance_ > 0 ? merged.points : points, context));
+  const std::span<const double> all = imaged.HasImages() ? imaged.points : points;
+  if (merge_distance_ > 0) {
+    AppendImages(imaged, merged);
+  }
+  absl::StatusOr<SortedCloud<D>> cloud = SortAndBuild(parameters, all, merged, context);
   if (IsTooClose(cloud.status())) {
-    return TooClosePairsError<D>(frame_, merge_distance_ > 0 ? merged.points : points, merged.inputs,
-                                 !parameters.domain_low.empty(), parameters.margin, cloud.status(), context);
+    const std::span<const uint32_t> inputs = std::span(merged.inputs).first(stayed);
+    const std::vector<uint32_t> names = imaged.HasImages() ? imaged.Names(inputs) : merged.inputs;
+    const absl::Status error =
+        TooClosePairsError<D>(frame_, merge_distance_ > 0 ? merged.points : all, names, !parameters.domain_low.empty(),
+                              parameters.margin, cloud.status(), context);
+    return imaged.HasImages() ? ExplainImages(error) : error;
   }
   WELLSPACE_RETURN_IF_ERROR(cloud.status());
+  const auto corners = static_cast<uint32_t>(structure_.built_count() - cloud->first_input.size());
   WELLSPACE_ASSIGN_OR_RETURN(PointNames names, NamePoints<D>(*std::move(cloud), context));
-  numbering_.Begin(std::move(names), points, merged.inputs);
+  numbering_.Begin(std::move(names), points, std::span(merged.inputs).first(stayed), {imaged.sources.size(), corners});
   numbering_.CountMerged(merged.merged);
   repairs_.is_given().assign(structure_.built_count(), true);
   return absl::OkStatus();
@@ -104,13 +143,35 @@ uint64_t BoxMesher<D>::OtherBytes() const {
 }
 
 template <int D>
+absl::Status BoxMesher<D>::CheckDemands(const MeshParameters& parameters) const {
+  if (periodic_axes_.empty()) {
+    return absl::OkStatus();
+  }
+  MeshParameters here = parameters;
+  here.periodic_axes = periodic_axes_;
+  return ValidateParameters(here);
+}
+
+template <int D>
+BoxDomain<D> BoxMesher<D>::ToRefine() {
+  if constexpr (BoxDomain<D>::kMayHaveImages) {
+    return BoxDomain<D>(PeriodicIn(frame_.scaled_box));
+  } else {
+    return {};
+  }
+}
+
+template <int D>
 absl::Status BoxMesher<D>::CheckFeasibleHere(const MeshParameters& parameters) const {
   return CheckFeasible<D>(frame_, parameters, samples_, numbering_.distinct_inputs());
 }
 
 template <int D>
 absl::Status BoxMesher<D>::AddToEstimate(const MeshParameters& parameters, const MeshCriteria<D>& /*criteria*/,
-                                         const RunContext& /*context*/, MeshEstimate& estimate) const {
+                                         const RunContext& context, MeshEstimate& estimate) const {
+  if (!periodic_axes_.empty()) {
+    WELLSPACE_RETURN_IF_ERROR(AddImages<D>(structure_, PeriodicIn(frame_.scaled_box), context, estimate));
+  }
   if constexpr (D >= 3) {
     if (MinDihedralOf(parameters) > 0 || parameters.pump_weights) {
       AddSliverStage<D>(estimate);
@@ -127,7 +188,7 @@ absl::Status BoxMesher<D>::Improve(const MeshParameters& parameters, RunContext&
     if (const double min_dihedral = MinDihedralOf(parameters); min_dihedral > 0) {
       const RepairCriteria criteria{Base::CriteriaOf(parameters), min_dihedral, frame_.MinEdge(),
                                     VertexBudget(parameters)};
-      BoxCarrier carrier;
+      BoxCarrier carrier(structure_, PeriodicIn(frame_.scaled_box).faces());
       const absl::Status status = repairs_.Repair(slivers_, structure_, *refinement_, carrier, criteria, parameters,
                                                   figures_.extracted_vertices, context);
       pumps_ = parameters.pump_weights && slivers_.statistics().slivers_left > 0;
@@ -183,6 +244,9 @@ absl::Status BoxMesher<D>::Describe(Mesh& mesh, std::span<const uint32_t> /*face
   mesh.vertex_origins.assign(structure_.vertex_count(), kSteinerOrigin);
   const auto origins = mesh.vertex_origins.begin();
   std::fill(origins, origins + structure_.built_count(), kCornerOrigin);
+  numbering_.ForEachImage([&](VertexId v, uint32_t number) {
+    origins[number] = std::popcount(structure_.faces(v)) < D ? kSteinerOrigin : kCornerOrigin;
+  });
   repairs_.ForEachAdded([&](VertexId v) { origins[Index(v)] = kRepairOrigin; });
   const auto& input_vertex = numbering_.input_vertex();
   for (size_t i = input_vertex.size(); i > 0; --i) {

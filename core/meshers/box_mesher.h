@@ -6,11 +6,13 @@
 #include <span>
 #include <type_traits>
 #include <variant>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "core/base/memory/huge_pages.h"
 #include "core/base/run_context.h"
+#include "core/geometry/periodic_box.h"
 #include "core/input/near_points.h"
 #include "core/input/sorted_cloud.h"
 #include "core/meshers/mesher.h"
@@ -34,9 +36,12 @@ class BoxMesher final : public MesherOf<BoxDomain<D>> {
 
   uint64_t BuildingBytes(const MeshParameters& parameters, const Input& input) const override;
   absl::Status Build(const MeshParameters& parameters, const Input& input, RunContext& context) override;
-  BoxDomain<D> ToRefine() override { return {}; }
-  AdderOptions Adding() override { return {.merge_distance = merge_distance_, .is_given = &repairs_.is_given()}; }
+  BoxDomain<D> ToRefine() override;
+  AdderOptions Adding() override {
+    return {.merge_distance = merge_distance_, .is_given = &repairs_.is_given(), .periodic_axes = periodic_axes_};
+  }
   uint64_t OtherBytes() const override;
+  absl::Status CheckDemands(const MeshParameters& parameters) const override;
   absl::Status CheckFeasibleHere(const MeshParameters& parameters) const override;
   absl::Status AddToEstimate(const MeshParameters& parameters, const MeshCriteria<D>& criteria,
                              const RunContext& context, MeshEstimate& estimate) const override;
@@ -55,12 +60,14 @@ class BoxMesher final : public MesherOf<BoxDomain<D>> {
                                       const RunContext& context);
   absl::StatusOr<SortedCloud<D>> SortAndBuild(const MeshParameters& parameters, std::span<const double> points,
                                               const MergedPoints& merged, const RunContext& context);
+  PeriodicBox<D> PeriodicIn(const Box<D>& box) const { return PeriodicBox<D>(box, periodic_axes_); }
   static double MinDihedralOf(const MeshParameters& parameters);
 
   [[no_unique_address]] std::conditional_t<(D >= 3), SliverStage<D>, std::monostate> slivers_;
   bool pumps_ = false;
   RepairLog repairs_;
   double merge_distance_ = 0;
+  std::vector<int> periodic_axes_;
 };
 
 }  // namespace wellspace::core

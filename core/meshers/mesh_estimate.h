@@ -2,9 +2,11 @@
 #ifndef WELLSPACE_CORE_MESHERS_MESH_ESTIMATE_H_
 #define WELLSPACE_CORE_MESHERS_MESH_ESTIMATE_H_
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "core/base/run_context.h"
 #include "core/base/saturate.h"
+#include "core/geometry/periodic_box.h"
 #include "core/mesh/mesh.h"
 #include "core/refine/criteria.h"
 #include "core/refine/plane/planar_domain.h"
@@ -29,6 +31,16 @@ void AddSliverStage(MeshEstimate& estimate) {
   estimate.memory_bytes = SaturatedCount(static_cast<double>(estimate.memory_bytes) + static_cast<double>(bytes));
   estimate.bytes_per_vertex += static_cast<double>(bytes) / static_cast<double>(estimate.vertices);
 }
+
+// Adds to an estimate the vertices that a periodic box has beside those of another: the images of vertices on its
+// sides, and what they ask for around them. Sizes are not looked at.
+//
+// REQUIRES:   no vertex has been inserted yet.
+// Complexity: one query a vertex.
+// Errors:     CANCELLED, DEADLINE_EXCEEDED.
+template <int D>
+absl::Status AddImages(const QueryStructure<D>& structure, const PeriodicBox<D>& periodic, const RunContext& context,
+                       MeshEstimate& estimate);
 
 }  // namespace wellspace::core
 

@@ -9,6 +9,7 @@
 #include "core/base/memory/huge_pages.h"
 #include "core/base/status_macros.h"
 #include "core/input/mesh_parameters.h"
+#include "core/input/point_images.h"
 #include "core/input/refused_points.h"
 #include "core/input/separation.h"
 
@@ -18,35 +19,46 @@ absl::StatusOr<std::vector<uint32_t>> PointAdder<D>::AddPoints(std::span<const d
                                                                std::span<const uint32_t> near,
                                                                const RunContext& context) {
   WELLSPACE_RETURN_IF_ERROR(CheckShape(points, D));
-  if (!near.empty() && near.size() != points.size() / D) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("near: it has ", near.size(), " vertices for ", points.size() / D, " points"));
-  }
-  WELLSPACE_RETURN_IF_ERROR(CheckVertices(near, structure_.vertex_count()));
+  WELLSPACE_RETURN_IF_ERROR(CheckNear(near, points.size() / D));
   WELLSPACE_ASSIGN_OR_RETURN(const std::vector<PlanePlace> places, FindPlaces(points, near, context));
   WELLSPACE_ASSIGN_OR_RETURN(const Merged merged, Merge(points, near, context));
   const bool merges = merge_distance_ > 0;
-  const std::vector<uint32_t>& inputs = merged.others.inputs;
-  const std::span<const double> others = merges ? merged.others.points : points;
+  const std::span<const double> given = merges ? merged.others.points : points;
+  WELLSPACE_ASSIGN_OR_RETURN(const PointsWithImages imaged, WithImages<D>(periodic_, given, context));
+  const std::vector<uint32_t> inputs = imaged.HasImages() ? imaged.Names(merged.others.inputs) : merged.others.inputs;
+  const std::span<const double> others = imaged.HasImages() ? imaged.points : given;
   const auto explain = [&](const absl::Status& found) {
-    return IsTooClose(found) ? TooClosePairsError<D>(frame_, others, inputs, true, 0, found, context) : found;
+    if (!IsTooClose(found)) {
+      return found;
+    }
+    const absl::Status error = TooClosePairsError<D>(frame_, others, inputs, true, 0, found, context);
+    return imaged.HasImages() ? ExplainImages(error) : error;
   };
   absl::StatusOr<SortedCloud<D>> sorted = SortCloud<D>(frame_, others, 1, context, inputs);
   WELLSPACE_RETURN_IF_ERROR(explain(sorted.status()));
   SortedCloud<D> cloud = *std::move(sorted);
   const HugeVector<uint32_t> sorted_of = cloud.SortedOfInputs();
-  for (uint32_t& input : cloud.first_input) {
+  std::vector<bool> is_image(cloud.points.size(), false);
+  for (size_t i = 0; i < cloud.points.size(); ++i) {
+    uint32_t& input = cloud.first_input[i];
+    is_image[i] = input >= given.size() / D;
     input = inputs.empty() ? input : inputs[input];
   }
   WELLSPACE_RETURN_IF_ERROR(explain(CheckApart<D>(frame_, cloud, context)));
-  WELLSPACE_ASSIGN_OR_RETURN(std::vector<VertexId> vertex_of, FindAll(cloud, near, context));
+  WELLSPACE_ASSIGN_OR_RETURN(std::vector<VertexId> vertex_of, FindAll(cloud, is_image, near, context));
   if (structure_.vertex_count() + cloud.points.size() > kMaxVertices) {
     return absl::ResourceExhaustedError(absl::StrCat("points: ", cloud.points.size(), " beside ",
                                                      structure_.vertex_count(),
                                                      " vertices are more than can be numbered, ", kMaxVertices));
   }
   for (size_t i = 0; i < cloud.points.size(); ++i) {
-    if (const uint32_t input = cloud.first_input[i]; vertex_of[i] == kNoVertex) {
+    if (vertex_of[i] != kNoVertex) {
+      continue;
+    }
+    if (is_image[i]) {
+      vertex_added_(structure_.AddVertex(kNoVertex, cloud.points[i]));
+    } else {
+      const uint32_t input = cloud.first_input[i];
       vertex_of[i] = Add(Start(near, input), cloud.points[i], points, input, places);
     }
   }
@@ -75,6 +87,10 @@ absl::StatusOr<uint32_t> PointAdder<D>::AddVertex(uint32_t near, std::span<const
     return absl::ResourceExhaustedError(absl::StrCat("no more than ", kMaxVertices, " vertices can be numbered"));
   }
   const RunContext context;
+  if (periodic_.HasAxes()) {
+    WELLSPACE_ASSIGN_OR_RETURN(const std::vector<uint32_t> vertices, AddPoints(point, {&near, 1}, context));
+    return vertices[0];
+  }
   WELLSPACE_ASSIGN_OR_RETURN(const std::vector<PlanePlace> places, FindPlaces(point, {&near, 1}, context));
   WELLSPACE_RETURN_IF_ERROR(CheckPoints<D>(frame_, point, context));
   const VertexId start = numbering_.VertexOf(near);
@@ -92,6 +108,14 @@ absl::StatusOr<uint32_t> PointAdder<D>::AddVertex(uint32_t near, std::span<const
   numbering_.CountMerged(merged);
   numbering_.AppendInputs({&vertex, 1});
   return vertex;
+}
+
+template <int D>
+absl::Status PointAdder<D>::CheckNear(std::span<const uint32_t> near, size_t points) const {
+  if (!near.empty() && near.size() != points) {
+    return absl::InvalidArgumentError(absl::StrCat("near: it has ", near.size(), " vertices for ", points, " points"));
+  }
+  return CheckVertices(near, structure_.vertex_count());
 }
 
 // Where points lie in a domain of the plane; none where all of the box is meshed.
@@ -152,9 +176,10 @@ VertexId PointAdder<D>::FindMerged(const Point<D>& p, VertexId near, uint64_t& m
   return nearest;
 }
 
-// Find for each of a cloud.
+// Find for each of a cloud. Where images are is_image is true: the vertices of `near` are not near those.
 template <int D>
 absl::StatusOr<std::vector<VertexId>> PointAdder<D>::FindAll(const SortedCloud<D>& cloud,
+                                                             const std::vector<bool>& is_image,
                                                              std::span<const uint32_t> near,
                                                              const RunContext& context) {
   std::vector<VertexId> found(cloud.points.size(), kNoVertex);
@@ -162,11 +187,12 @@ absl::StatusOr<std::vector<VertexId>> PointAdder<D>::FindAll(const SortedCloud<D
   for (size_t i = 0; i < cloud.points.size(); ++i) {
     WELLSPACE_RETURN_IF_ERROR(context.Check());
     const uint32_t input = cloud.first_input[i];
-    const absl::StatusOr<VertexId> vertex = Find(cloud.points[i], input, Start(near, input));
+    const VertexId start = is_image[i] ? kNoVertex : Start(near, input);
+    const absl::StatusOr<VertexId> vertex = Find(cloud.points[i], input, start);
     if (vertex.ok()) {
       found[i] = *vertex;
     } else {
-      refused.Add(input, vertex.status());
+      refused.Add(input, is_image[i] ? ExplainImages(vertex.status()) : vertex.status());
     }
   }
   if (!refused.IsEmpty()) {

@@ -9,9 +9,11 @@
 #include <utility>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "core/base/ids.h"
 #include "core/base/run_context.h"
+#include "core/geometry/periodic_box.h"
 #include "core/geometry/point.h"
 #include "core/input/frame.h"
 #include "core/input/near_points.h"
@@ -28,6 +30,8 @@ struct AdderOptions {
   double merge_distance = 0;  // points no farther than this from a vertex become that one
   // By vertex, whether it is given: set for those that points become; null: that is not asked for.
   std::vector<bool>* is_given = nullptr;
+  // The axes along which the box is periodic: a vertex on such a side is added with its images.
+  std::span<const int> periodic_axes{};
   // The placer of a domain in the plane, of the same merge distance; null: all of the box is meshed.
   PointPlacer* placer = nullptr;
 };
@@ -50,7 +54,8 @@ class PointAdder {
         numbering_(numbering),
         merge_distance_(options.merge_distance),
         is_given_(options.is_given),
-        placer_(options.placer) {}
+        placer_(options.placer),
+        periodic_(frame.box, options.periodic_axes) {}
 
   // Mesher::AddPointsNear.
   absl::StatusOr<std::vector<uint32_t>> AddPoints(std::span<const double> points, std::span<const uint32_t> near,
@@ -71,13 +76,14 @@ class PointAdder {
     return near.empty() ? kNoVertex : numbering_.VertexOf(near[index]);
   }
 
+  absl::Status CheckNear(std::span<const uint32_t> near, size_t points) const;
   absl::StatusOr<std::vector<PlanePlace>> FindPlaces(std::span<const double> points, std::span<const uint32_t> near,
                                                      const RunContext& context);
   absl::StatusOr<Merged> Merge(std::span<const double> points, std::span<const uint32_t> near,
                                const RunContext& context);
   VertexId FindMerged(const Point<D>& p, VertexId near, uint64_t& merged);
-  absl::StatusOr<std::vector<VertexId>> FindAll(const SortedCloud<D>& cloud, std::span<const uint32_t> near,
-                                                const RunContext& context);
+  absl::StatusOr<std::vector<VertexId>> FindAll(const SortedCloud<D>& cloud, const std::vector<bool>& is_image,
+                                                std::span<const uint32_t> near, const RunContext& context);
   absl::StatusOr<VertexId> Find(const Point<D>& p, size_t index, VertexId near);
   VertexId Add(VertexId near, const Point<D>& p, std::span<const double> points, size_t index,
                const std::vector<PlanePlace>& places);
@@ -90,6 +96,7 @@ class PointAdder {
   const double merge_distance_;
   std::vector<bool>* const is_given_;
   PointPlacer* const placer_;
+  const PeriodicBox<D> periodic_;
   Workspace<D> workspace_;
 };
 

@@ -6,9 +6,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include "core/base/ids.h"
+#include "core/geometry/periodic_box.h"
 #include "core/refine/cell_steps.h"
 #include "core/refine/insertion.h"
 #include "core/refine/step_rules.h"
@@ -35,6 +37,8 @@ namespace wellspace::core {
 //   kNotifiesAll       bool: whether all neighbours get a notice, so that notices are recorded only where they are
 //                      wanted.
 //   kAsksForDistances  bool: whether a request depends on all vertices near its point, and not on the cell alone.
+//   kMayHaveImages     bool: whether vertices may have images, which are inserted with them; then there is periodic(),
+//                      the PeriodicBox that says where.
 //   RulesFor(structure, step_rules, expected)
 //                      The Rules of a run, with a null pointer; or for a record, with the vertices its batch expects.
 //   LeastInRounds(least, vertices)
@@ -61,6 +65,7 @@ concept RefinedDomain = requires(T domain, const T& same, const typename T::Plac
   { T::kHasFeatures } -> std::convertible_to<bool>;
   { T::kNotifiesAll } -> std::convertible_to<bool>;
   { T::kAsksForDistances } -> std::convertible_to<bool>;
+  { T::kMayHaveImages } -> std::convertible_to<bool>;
   { same.RulesFor(structure, rules, expected) } -> std::same_as<typename T::Rules>;
   { same.LeastInRounds(least, vertices) } -> std::same_as<size_t>;
   domain.MakeRoom(least);
@@ -85,7 +90,8 @@ class BoxRules {
   const StepRules<D>& rules_;
 };
 
-// The box of a structure, whose faces are known to its cells and to StepRules. Nothing is kept.
+// The box of a structure, whose faces are known to its cells and to StepRules. Nothing is kept but along which axes it
+// is periodic.
 //
 // Thread safety: thread-safe.
 template <int D>
@@ -106,6 +112,16 @@ class BoxDomain {
   static constexpr bool kHasFeatures = false;
   static constexpr bool kNotifiesAll = false;
   static constexpr bool kAsksForDistances = false;
+  static constexpr bool kMayHaveImages = D <= 3;
+
+  // The box is not periodic.
+  BoxDomain() = default;
+
+  // REQUIRES:   `periodic` is of the structure's box; each vertex that the structure has when the refinement begins, or
+  //             that is added from outside, has its images there.
+  explicit BoxDomain(const PeriodicBox<D>& periodic) requires(kMayHaveImages) : periodic_(periodic) {}
+
+  const PeriodicBox<D>& periodic() const requires(kMayHaveImages) { return periodic_; }
 
   Rules RulesFor(const QueryStructure<D>& /*structure*/, const StepRules<D>& rules,
                  const Expected* /*expected*/) const {
@@ -116,6 +132,11 @@ class BoxDomain {
   void Added(const Place& /*place*/) {}
   bool AreInOrder(std::span<const Request> /*requests*/) const { return true; }
   uint64_t MemoryBytes() const { return 0; }
+
+ private:
+  struct None {};
+
+  [[no_unique_address]] std::conditional_t<kMayHaveImages, PeriodicBox<D>, None> periodic_;
 };
 
 }  // namespace wellspace::core

@@ -196,10 +196,14 @@ absl::Status Refinement<Domain>::RefineNextOf(Batch<Domain>& batch) {
   if (status.ok()) {
     const bool is_valid = IsNextStillValid(batch);
     rounds_.CountRecord(batch, is_valid);
+    bool is_done = false;
     if (is_valid) {
       RecordedSteps<Domain> steps(batch);
-      status = RefineVertex(v, bucket, steps);
-    } else {
+      const absl::StatusOr<bool> refined = RefineVertex(v, bucket, steps);
+      status = refined.status();
+      is_done = refined.ok() && *refined;
+    }
+    if (status.ok() && !is_done) {
       status = RefineByCell(v, bucket);
     }
   }
@@ -233,23 +237,29 @@ bool Refinement<Domain>::IsNextStillValid(const Batch<Domain>& batch) const {
 }
 
 // Refines `v`, which was taken from `bucket`, by steps that are computed. The order that is checked is promised in a
-// box.
+// box; where images have just been inserted it is for RefineVertex to see to it.
 template <typename Domain>
 absl::Status Refinement<Domain>::RefineByCell(VertexId v, int bucket) {
   CurrentCells cells{*this};
-  typename Domain::template Steps<CurrentCells> steps(*rules_, v, EdgeLimitSq(bucket), cells, workspace_);
-  if constexpr (kChecks && !Domain::kHasFeatures) {
-    steps.cell().Place();
-    checks_.CheckOrder(pending_.schedule(), v, steps.cell(), bucket);
+  for (bool is_done = false; !is_done;) {
+    typename Domain::template Steps<CurrentCells> steps(*rules_, v, EdgeLimitSq(bucket), cells, workspace_);
+    if constexpr (kChecks && !Domain::kHasFeatures) {
+      steps.cell().Place();
+      if (images_.empty()) {
+        checks_.CheckOrder(pending_.schedule(), v, steps.cell(), bucket);
+      }
+    }
+    WELLSPACE_ASSIGN_OR_RETURN(is_done, RefineVertex(v, bucket, steps));
   }
-  return RefineVertex(v, bucket, steps);
+  return absl::OkStatus();
 }
 
 // [HT08] Figure 4 for one vertex, `v`, which was taken from `bucket`: makes the insertions that its steps ask for,
-// until its cell has no more faults that count in the bucket, or a shorter edge comes first.
+// until its cell has no more faults that count in the bucket, or a shorter edge comes first. False if `steps` ended
+// before: images were inserted, which they do not know, and may cut the cell; then v goes on with other steps.
 template <typename Domain>
 template <typename Steps>
-absl::Status Refinement<Domain>::RefineVertex(VertexId v, int bucket, Steps& steps) {
+absl::StatusOr<bool> Refinement<Domain>::RefineVertex(VertexId v, int bucket, Steps& steps) {
   while (true) {
     const Assessment* const found = steps.Assess();  // lines 7, 8 and 11
     if (found == nullptr) {
@@ -261,16 +271,21 @@ absl::Status Refinement<Domain>::RefineVertex(VertexId v, int bucket, Steps& ste
     }
     if (pending_.HasShorterThan(bucket)) {
       pending_.Postpone(v, *found, bucket);
-      return absl::OkStatus();
+      return true;
     }
     const typename Domain::Request* const request = steps.NextRequest();
     if (request == nullptr) {
       Finish(v, *found, bucket, steps);
-      return absl::OkStatus();
+      return true;
     }
     // In 5-D and 6-D a cell may ask for a dozen points, which take milliseconds each.
     WELLSPACE_RETURN_IF_ERROR(context_->Check());
     WELLSPACE_ASSIGN_OR_RETURN(const VertexId x, Insert(*request));  // lines 12 and 13
+    if constexpr (Domain::kMayHaveImages) {
+      if (!images_.empty()) {
+        return false;
+      }
+    }
     steps.Inserted(x);
   }
 }
@@ -290,18 +305,19 @@ void Refinement<Domain>::Finish(VertexId v, const Assessment& found, int bucket,
   }
 }
 
-// Inserts the vertex that is asked for, and makes it pending.
+// Inserts the vertex that is asked for, and its images, and makes them pending: all or, on an error, none.
 template <typename Domain>
 absl::StatusOr<VertexId> Refinement<Domain>::Insert(const typename Domain::Request& request) {
   const SteinerPoint<D>& point = request.point;
-  if (structure_.vertex_count() >= max_vertices_) {
+  if constexpr (Domain::kMayHaveImages) {
+    FindImages(point.position);
+  }
+  if (structure_.vertex_count() + images_.size() >= max_vertices_) {
     return TooManyVerticesError(max_vertices_);
   }
-  if (!step_rules_->IsLongEnough(point)) {
-    return absl::ResourceExhaustedError(absl::StrCat("refinement came to an edge of length ",
-                                                     std::sqrt(std::max(0.0, point.empty_radius_sq)),
-                                                     ", below the smallest that double arithmetic serves here, ",
-                                                     min_edge_, "; raise rho = ", step_rules_->criteria().rho));
+  WELLSPACE_RETURN_IF_ERROR(CheckPoint(point));
+  for (const Image& image : images_) {
+    WELLSPACE_RETURN_IF_ERROR(CheckPoint(image.point));
   }
   if constexpr (kChecks) {
     rounds_.CommitAdded();
@@ -309,18 +325,61 @@ absl::StatusOr<VertexId> Refinement<Domain>::Insert(const typename Domain::Reque
                            request.place.IsOnFeature());
   }
   Insertion insertion = request.insertion;
-  insertion.vertex = structure_.AddUncommitted(insertion.near, point.position);
-  if (!rounds_.IsRecording() || *observer_ || structure_.uncommitted_count() == QueryStructure<D>::kMostUncommitted) {
-    rounds_.CommitAdded();
+  insertion.vertex = AddVertex(insertion.near, insertion.near, point, request.place);
+  for (const Image& image : images_) {
+    AddVertex(image.near, insertion.vertex, image.point, {});
   }
-  domain_.Added(request.place);
-  rounds_.NoteInserted(point.position);
-  context_->SetVertices(structure_.vertex_count());
-  AddPending(insertion.near, insertion.vertex, point.empty_radius_sq);
   if (*observer_) {
     (*observer_)(structure_, insertion);
   }
   return insertion.vertex;
+}
+
+// Finds the images of `p`, and how near to them vertices are or, by then, will be. All vertices of a periodic side have
+// theirs, so where there is none at `p` there is none at its images. Which of the nearest vertices is found depends on
+// what has been committed: it may say where the search begins, and nothing else.
+template <typename Domain>
+void Refinement<Domain>::FindImages(const Point<D>& p) {
+  images_.clear();
+  if constexpr (Domain::kMayHaveImages) {
+    if (!domain_.periodic().HasAxes()) {
+      return;
+    }
+    domain_.periodic().ForEachImage(p, [&](const Point<D>& at) {
+      const Neighbor nearest = structure_.NearestTo(at, kNoVertex, workspace_.other);
+      double empty_sq = structure_.NearestUncommittedSq(at, nearest.distance_sq);
+      empty_sq = std::min(empty_sq, DistanceSq<D>(at, p));
+      for (const Image& other : images_) {
+        empty_sq = std::min(empty_sq, DistanceSq<D>(at, other.point.position));
+      }
+      images_.push_back({{at, empty_sq}, nearest.vertex});
+    });
+  }
+}
+
+template <typename Domain>
+absl::Status Refinement<Domain>::CheckPoint(const SteinerPoint<D>& point) const {
+  return step_rules_->IsLongEnough(point)
+             ? absl::OkStatus()
+             : absl::ResourceExhaustedError(absl::StrCat("refinement came to an edge of length ",
+                                                         std::sqrt(std::max(0.0, point.empty_radius_sq)),
+                                                         ", below the smallest that double arithmetic serves here, ",
+                                                         min_edge_, "; raise rho = ", step_rules_->criteria().rho));
+}
+
+// Adds a vertex near `near`, and makes it pending, in the order of the schedule beside `beside`.
+template <typename Domain>
+VertexId Refinement<Domain>::AddVertex(VertexId near, VertexId beside, const SteinerPoint<D>& point,
+                                       const typename Domain::Place& place) {
+  const VertexId x = structure_.AddUncommitted(near, point.position);
+  if (!rounds_.IsRecording() || *observer_ || structure_.uncommitted_count() == QueryStructure<D>::kMostUncommitted) {
+    rounds_.CommitAdded();
+  }
+  domain_.Added(place);
+  rounds_.NoteInserted(point.position);
+  context_->SetVertices(structure_.vertex_count());
+  AddPending(beside, x, point.empty_radius_sq);
+  return x;
 }
 
 // Makes the new vertex `x`, which is near `near` and whose nearest neighbour is as near as it says, pending. Its

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -115,6 +116,12 @@ class Refinement {
   uint64_t MemoryBytes() const;
 
  private:
+  // An image of a vertex that is inserted, and a vertex near it.
+  struct Image {
+    SteinerPoint<D> point;
+    VertexId near = kNoVertex;
+  };
+
   // The cells of all vertices that have been added, for CellSteps.
   struct CurrentCells {
     void ComputeOwn(VertexId v, const Box<D>& clip, Workspace<D>& workspace) {
@@ -141,10 +148,13 @@ class Refinement {
   absl::Status RefineTaken(VertexId v, int bucket);
   absl::Status RefineByCell(VertexId v, int bucket);
   template <typename Steps>
-  absl::Status RefineVertex(VertexId v, int bucket, Steps& steps);
+  absl::StatusOr<bool> RefineVertex(VertexId v, int bucket, Steps& steps);
   template <typename Steps>
   void Finish(VertexId v, const Assessment& found, int bucket, Steps& steps);
   absl::StatusOr<VertexId> Insert(const typename Domain::Request& request);
+  void FindImages(const Point<D>& p);
+  absl::Status CheckPoint(const SteinerPoint<D>& point) const;
+  VertexId AddVertex(VertexId near, VertexId beside, const SteinerPoint<D>& point, const typename Domain::Place& place);
   void AddPending(VertexId near, VertexId x, double nearest_sq);
   void ComputeCell(VertexId v, const Box<D>& clip, Workspace<D>& workspace);
   absl::Status CountRefined();
@@ -157,6 +167,7 @@ class Refinement {
   StarWriter<D> stars_;  // of vertices that are done, or have been
   Rounds<Domain> rounds_;
   StepWorkspace<D> workspace_;
+  std::vector<Image> images_;  // of the vertex that was inserted last
 
   // State of the last run.
   std::optional<StepRules<D>> step_rules_;

@@ -12,6 +12,7 @@
 #include "core/geometry/exact_measure.h"
 #include "core/geometry/point.h"
 #include "core/sliver/triangulation.h"
+#include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {
 
@@ -65,7 +66,8 @@ concept VertexCarrier = requires(T carrier, const T& same, const Triangulation<3
   { same.MemoryBytes() } -> std::same_as<uint64_t>;
 };
 
-// Vertices stay on the faces of the box that they are on, and off all others. Nothing is kept.
+// Vertices stay on the faces of the box that they are on, and off all others; those on faces across periodic axes stay
+// where they are, as do their images.
 //
 // Thread safety: thread-safe.
 class BoxCarrier {
@@ -73,7 +75,14 @@ class BoxCarrier {
   using Track = FaceMask;
   static constexpr bool kMeshesAll = true;
 
-  bool MayMove(VertexId /*v*/) const { return true; }
+  // The box is not periodic.
+  BoxCarrier() = default;
+
+  // REQUIRES:   `structure` outlives this; its vertices are those of the triangulation.
+  BoxCarrier(const QueryStructure<3>& structure, FaceMask periodic_faces)
+      : structure_(&structure), periodic_faces_(periodic_faces) {}
+
+  bool MayMove(VertexId v) const { return periodic_faces_ == 0 || (structure_->faces(v) & periodic_faces_) == 0; }
   FaceMask TrackOf(const Triangulation<3>& triangulation, VertexId v) const { return triangulation.faces(v); }
   std::optional<Point<3>> Bring(const Triangulation<3>& triangulation, FaceMask faces, Point<3> p) const {
     const Box<3>& box = triangulation.box();
@@ -93,6 +102,10 @@ class BoxCarrier {
   void Moved(const Triangulation<3>& /*triangulation*/, VertexId /*v*/, VertexId /*near*/) const {}
   void Added(const Triangulation<3>& /*triangulation*/, VertexId /*v*/, VertexId /*near*/) const {}
   uint64_t MemoryBytes() const { return 0; }
+
+ private:
+  const QueryStructure<3>* structure_ = nullptr;
+  FaceMask periodic_faces_ = 0;  // those across periodic axes
 };
 static_assert(VertexCarrier<BoxCarrier>);
 

@@ -173,6 +173,21 @@ absl::StatusOr<core::MeshParameters> ParametersForSession(const v1::MeshParamete
                                   known.merge_distance, ", which cannot change; leave it out"),
                      "parameters.merge_distance");
   }
+  if (!parameters.periodic_axes.empty() && parameters.periodic_axes != known.periodic_axes) {
+    const auto text = [](const std::vector<int>& axes) {
+      return axes.empty() ? std::string("none") : absl::StrJoin(axes, ", ");
+    };
+    return MakeError(v1::ERROR_REASON_INVALID_PARAMETERS,
+                     absl::StrCat("periodic_axes are ", text(parameters.periodic_axes), ", but the session has ",
+                                  text(known.periodic_axes), ", which cannot change; leave them out"),
+                     "parameters.periodic_axes");
+  }
+  if (parameters.pump_weights && !known.periodic_axes.empty()) {
+    return MakeError(v1::ERROR_REASON_INVALID_PARAMETERS,
+                     "pump_weights: true is not allowed, since the box of the session is periodic; leave it out",
+                     "parameters.pump_weights");
+  }
+  parameters.periodic_axes = known.periodic_axes;
   parameters.merge_distance = known.merge_distance;
   parameters.domain_low = known.domain_low;
   parameters.domain_high = known.domain_high;

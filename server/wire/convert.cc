@@ -295,6 +295,9 @@ absl::StatusOr<core::MeshParameters> ParametersFromProto(const v1::MeshParameter
     parameters.min_dihedral = message.min_dihedral();
     WELLSPACE_RETURN_IF_ERROR(Validate(parameters, "min_dihedral"));
   }
+  parameters.periodic_axes.assign(message.periodic_axes().begin(), message.periodic_axes().end());
+  WELLSPACE_RETURN_IF_ERROR(Validate(parameters, "periodic_axes"));
+  std::sort(parameters.periodic_axes.begin(), parameters.periodic_axes.end());
   parameters.pump_weights = message.pump_weights();
   parameters.keep_vertices = message.keep_vertices();
   WELLSPACE_RETURN_IF_ERROR(Validate(parameters, "pump_weights"));
@@ -377,6 +380,7 @@ v1::MeshParameters ParametersToProto(const core::MeshParameters& parameters) {
   if (parameters.merge_distance != 0) {
     message.set_merge_distance(parameters.merge_distance);
   }
+  message.mutable_periodic_axes()->Assign(parameters.periodic_axes.begin(), parameters.periodic_axes.end());
   message.set_keep_vertices(parameters.keep_vertices);
   SetSurface(parameters.surface, message);
   if (parameters.max_vertices != 0) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/validate/validate.h"
+#include "core/validate/validate_periodic.h"
 #include "tests/fuzz/fuzz.h"
 
 namespace wellspace::fuzz {
@@ -58,6 +59,9 @@ void RequireValid(const core::Mesh& mesh, const core::MeshParameters& parameters
       {.dimension = mesh.dimension, .points = mesh.points, .simplices = mesh.simplices, .weights = mesh.weights},
       options);
   Require(valid.ok(), "a mesh is valid:", valid.ToString());
+  const absl::Status matches = core::ValidatePeriodic(
+      {.dimension = mesh.dimension, .points = mesh.points, .simplices = mesh.simplices}, parameters.periodic_axes);
+  Require(matches.ok(), "opposite sides of a periodic box match:", matches.ToString());
 }
 
 void RequireRefusal(const absl::Status& status) {

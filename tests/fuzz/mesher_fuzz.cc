@@ -62,6 +62,15 @@ void SetBox(int box, const Placement& placement, core::MeshParameters& parameter
   }
 }
 
+// Bits of `axes`, the lowest for the first axis.
+void SetPeriodicAxes(size_t axes, core::MeshParameters& parameters) {
+  for (int axis = 0; axis < parameters.dimension; ++axis) {
+    if ((axes >> axis & 1) != 0) {
+      parameters.periodic_axes.push_back(axis);
+    }
+  }
+}
+
 // `sizes`: the lowest two bits the bound everywhere, if any, the next two that of a box, the next three where it is,
 // the last one whether it is a point.
 void SetSizes(uint8_t sizes, const Placement& placement, core::MeshParameters& parameters) {
@@ -96,8 +105,8 @@ void SetEdit(uint8_t edit, Task& task) {
 
 // Byte 0: bit 0 dimension 2 or 3, bits 1 and 2 the box (SetBox); bit 3 two dimensions more; bit 4 well-spaced; bit 5
 // sizes; bit 6 an edit; bit 7 sizes at points. Byte 1: the exponent of the tiny step; from 3-D on bit 6 weights, bit 7
-// no repair. Byte 2: offset. Byte 3: scale. Byte 4: rho. With sizes a byte more (SetSizes), with an edit one more
-// (SetEdit), with sizes at points one more (SetSamples).
+// no repair. Byte 2: offset. Byte 3: scale. Byte 4: rho, and periodic axes (SetPeriodicAxes). With sizes a byte more
+// (SetSizes), with an edit one more (SetEdit), with sizes at points one more (SetSamples).
 Task ReadTask(ByteReader& bytes) {
   constexpr std::array kOffsets = {0.0, -0.5, 1.0, 0x1p20, -0x1p35};
   constexpr std::array kScales = {1.0, 3.0, 0x1p-40, 0x1p100, 0x1p-700, 0x1p900};
@@ -110,7 +119,8 @@ Task ReadTask(ByteReader& bytes) {
   placement.offset = kOffsets[bytes.Next() % kOffsets.size()];
   placement.scale = kScales[bytes.Next() % kScales.size()];
   parameters.dimension = 2 + (shape & 1) + ((shape >> 3 & 1) != 0 ? 2 : 0);
-  parameters.rho = kRhoFactors[bytes.Next() % kRhoFactors.size()] * core::MinimumRho(parameters.dimension);
+  const uint8_t rho = bytes.Next();
+  parameters.rho = kRhoFactors[rho % kRhoFactors.size()] * core::MinimumRho(parameters.dimension);
   parameters.max_vertices = kMaxVertices[parameters.dimension - 2];
   if (parameters.dimension > 2) {
     parameters.pump_weights = (step >> 6 & 1) != 0;
@@ -120,6 +130,9 @@ Task ReadTask(ByteReader& bytes) {
   }
   if ((shape >> 4 & 1) != 0) {
     parameters.criterion = core::Criterion::kWellSpaced;
+  }
+  if (parameters.dimension <= core::kMostPeriodicDimension && !parameters.pump_weights) {
+    SetPeriodicAxes(rho / kRhoFactors.size(), parameters);
   }
   SetBox(shape >> 1 & 3, placement, parameters);
   if ((shape >> 5 & 1) != 0) {

@@ -59,10 +59,14 @@ void ReadSurfaceField(int field, ByteReader& bytes, v1::MeshParameters& paramete
   }
 }
 
-// Byte: the lowest four bits which field, the next three the axis of a corner.
+// Byte: the lowest four bits which field, the next three an axis, of a corner; the last one whether the box is periodic
+// along it, too.
 void ReadField(ByteReader& bytes, v1::MeshParameters& parameters) {
   const uint8_t byte = bytes.Next();
   const int axis = (byte >> 4 & 7) % parameters.dimension();
+  if ((byte >> 7) != 0) {
+    parameters.add_periodic_axes(axis);
+  }
   const auto box = [&]() -> v1::SizeBox& {
     if (parameters.size_boxes().empty()) {
       v1::SizeBox* added = parameters.add_size_boxes();

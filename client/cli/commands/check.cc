@@ -35,6 +35,7 @@
 #include "core/validate/validate.h"
 #include "core/validate/validate_boundary.h"
 #include "core/validate/validate_domain.h"
+#include "core/validate/validate_periodic.h"
 
 namespace wellspace::cli {
 namespace {
@@ -171,6 +172,7 @@ struct CheckCommand {
   SizeFieldOptions size_field;
   std::optional<double> gradation;
   double min_dihedral = 0;
+  std::vector<int> periodic_axes;
   std::string plot_path;
   OutputFormat format = OutputFormat::kText;
 
@@ -360,6 +362,9 @@ core::ValidationOptions CheckCommand::ValidationFor(const WantedSizes& sizes, st
 }
 
 absl::Status CheckCommand::CheckOptionsOfDomain() const {
+  if (!periodic_axes.empty()) {
+    return absl::InvalidArgumentError("--periodic: it is for boxes, and the mesh is one of a domain");
+  }
   if (criterion == client::Criterion::kWellSpaced) {
     return absl::InvalidArgumentError(
         "--criterion well-spaced: a domain with segments or triangles has the radius-edge one alone");
@@ -404,9 +409,10 @@ absl::Status CheckCommand::Validate(const formats::Mesh& mesh, const core::MeshV
     WELLSPACE_RETURN_IF_ERROR(ValidateDomain(mesh, view, cloud));
     return ValidateShapes(view, sizes, cloud);
   }
-  const absl::Status status = core::ValidateMesh(view, ValidationFor(sizes, cloud, mesh.dimension));
-  if (!status.ok() || mesh.boundary.empty()) {
-    return status;
+  WELLSPACE_RETURN_IF_ERROR(core::ValidateMesh(view, ValidationFor(sizes, cloud, mesh.dimension)));
+  WELLSPACE_RETURN_IF_ERROR(core::ValidatePeriodic(view, periodic_axes));
+  if (mesh.boundary.empty()) {
+    return absl::OkStatus();
   }
   const std::vector<int32_t> tags = TagsOf(mesh);
   return core::ValidateBoundary(view, BoundaryOf(mesh, tags));
@@ -529,6 +535,9 @@ void AddCheckCommand(CLI::App& app, int& exit_code) {
   AddNumber(*check, "--min-dihedral", command->min_dihedral,
             "Bound on the dihedral angles, in 2-D on the angles, in degrees; default: not checked")
       ->check(AboveZero());
+  AddPeriodic(*check, command->periodic_axes,
+              "Axes along which opposite sides of the box must match, vertex by vertex and facet by facet, as x,y; "
+              "default: none");
   check
       ->add_option("--plot", command->plot_path, "Draw histograms of angles and radius-edge ratios, .png, .svg or .pdf")
       ->type_name("FILE");

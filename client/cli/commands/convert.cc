@@ -14,6 +14,7 @@
 #include "client/cli/interrupt.h"
 #include "client/cli/mesh_paths.h"
 #include "client/cli/meshing_options.h"
+#include "client/cli/parameter_options.h"
 #include "client/cli/part_name_options.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/remote_command.h"
@@ -45,6 +46,7 @@ struct ConvertCommand {
   DomainOptions domain;
   bool has_triangles = false;
   bool no_attributes = false;
+  std::vector<int> periodic_axes;
   OutputFormat format = OutputFormat::kText;
 
   absl::Status Convert();
@@ -66,6 +68,9 @@ bool ConvertCommand::IsSurface() const {
 absl::Status ConvertCommand::CheckArrays(const char* what) const {
   if (output.order != formats::MeshOrder::kFirst) {
     return absl::InvalidArgumentError(absl::StrCat("--order is for meshes, and IN is a ", what));
+  }
+  if (!periodic_axes.empty()) {
+    return absl::InvalidArgumentError(absl::StrCat("--periodic is for meshes, and IN is a ", what));
   }
   const bool is_npz = output.format.empty() ? formats::ExtensionOf(output.path) == ".npz" : output.format == "npz";
   return is_npz ? absl::OkStatus()
@@ -145,6 +150,7 @@ absl::Status ConvertCommand::ConvertMesh() {
   MarkVertices(by_name.ends_with(".node") || by_name.ends_with(".ele"), read.mesh);
   formats::MeshView view = read.View();
   view.order = output.order;
+  view.periodic_axes = periodic_axes;
   const CloudReport report = ReportOf(cloud_options, read.notes, read.skipped);
   PrintNotes(report, format, /*quiet=*/false);
   std::vector<std::string> losses;
@@ -182,6 +188,8 @@ void AddConvertCommand(CLI::App& app, int& exit_code) {
   convert->add_flag("--triangles", command->has_triangles,
                     "IN is a surface: faces of .stl, .obj, .ply and .off; .smesh and 3-D .poly always are");
   convert->add_flag("--no-attributes", command->no_attributes, "Leave out what points have beside coordinates");
+  AddPeriodic(*convert, command->periodic_axes,
+              "Axes along which the mesh of IN is periodic, as x,y: OUT gets the pairs of vertices; default: none");
   AddOutput(*convert, command->format);
   convert->callback([command, &exit_code] {
     const Interrupt interrupt(Interrupt::First::kEnd);

@@ -99,6 +99,7 @@ absl::Status MeshCommand::Mesh(client::Client& client, const client::MeshOptions
   file.KeepInputVertices();
   file.AddAttributes(cloud.attributes);
   file.NameParts(options.PartNames());
+  file.SetPeriodicAxes(mesh_options.periodic_axes);
   if (output.no_boundary) {
     file.LeaveOutBoundary();
   }

@@ -381,6 +381,10 @@ absl::Status DownloadCommand::Download(client::Client& client, const client::Cal
   if (output.no_boundary) {
     file.LeaveOutBoundary();
   }
+  if (formats::HasPlaceForPairs(output.path, output.format)) {
+    WELLSPACE_ASSIGN_OR_RETURN(const client::Session found, client.GetSession(session, call));
+    file.SetPeriodicAxes(found.parameters.periodic_axes);
+  }
   {
     ProgressBar bar(!remote.quiet() && !remote.json());
     WELLSPACE_RETURN_IF_ERROR(client.DownloadMesh(session, file, revision, Showing(bar), call));

@@ -1,5 +1,6 @@
 // Gmsh's MSH: 2.2 in ascii, 4.1 in binary.
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <map>
@@ -16,6 +17,7 @@
 #include "client/formats/mesh_writers.h"
 #include "client/formats/msh/msh.h"
 #include "client/formats/msh/msh_groups.h"
+#include "client/formats/periodic_pairs.h"
 #include "client/formats/regions.h"
 #include "core/base/status_macros.h"
 
@@ -30,6 +32,7 @@ class MshWriter : public MeshWriter {
  public:
   absl::Status AddPoints(std::span<const double> points) final {
     BeginNodes();
+    pairs_.Add(points);
     for (; !points.empty() && output_.status().ok(); points = points.subspan(shape_.dimension)) {
       row_.clear();
       AppendNode(points.first(shape_.dimension), ++vertices_, row_);
@@ -91,6 +94,7 @@ class MshWriter : public MeshWriter {
     BeginElements();
     EndSimplices();
     EndSection("$EndElements");
+    WELLSPACE_RETURN_IF_ERROR(WritePeriodic());
     WELLSPACE_RETURN_IF_ERROR(output_.status());
     WELLSPACE_RETURN_IF_ERROR(CheckComplete(shape_, {.vertices = vertices_,
                                                      .weights = weights_.size(),
@@ -108,6 +112,25 @@ class MshWriter : public MeshWriter {
   }
 
  protected:
+  // One side that is the image of another.
+  struct PeriodicLink {
+    int axis = 0;
+    int32_t entity = 0;
+    int32_t master = 0;
+    double length = 0;
+    uint64_t pairs = 0;
+
+    // Of homogeneous coordinates, row after row.
+    std::array<double, 16> Affine() const {
+      std::array<double, 16> affine{};
+      for (size_t i = 0; i < 4; ++i) {
+        affine[5 * i] = 1;
+      }
+      affine[4 * static_cast<size_t>(axis) + 3] = length;
+      return affine;
+    }
+  };
+
   MshWriter(OutputFile output, const MeshShape& shape, bool is_binary)
       : shape_(shape), output_(std::move(output)), is_binary_(is_binary) {}
 
@@ -134,6 +157,11 @@ class MshWriter : public MeshWriter {
   // The lines before the facets of a part.
   virtual void AppendBlock(const BoundaryPart& /*part*/, std::string& /*row*/) const {}
   virtual void AppendFacet(std::span<const uint32_t> corners, int32_t tag, uint64_t number, std::string& row) const = 0;
+  // The section of pairs, without its ends: `links` sides, each followed by its nodes.
+  virtual void AppendLinks(size_t links, std::string& row) const = 0;
+  // The entities of the high and of the low side, the length of the way between, and how many pairs follow.
+  virtual void AppendLink(const PeriodicLink& link, std::string& row) const = 0;
+  virtual void AppendPair(uint64_t node, uint64_t master, std::string& row) const = 0;
   virtual void AppendData(uint64_t node, double value, std::string& row) const = 0;
 
   int32_t TypeOf(int corners) const {
@@ -163,6 +191,39 @@ class MshWriter : public MeshWriter {
     }
   }
 
+  // The sides are entities by the tags that the parts of a box's boundary have.
+  absl::Status WritePeriodic() {
+    if (shape_.periodic_axes.empty() || shape_.boundary.empty()) {
+      AddNote(shape_.periodic_axes.empty()
+                  ? ""
+                  : "the file has no boundary, and therefore no pairs of vertices across periodic axes");
+      return absl::OkStatus();
+    }
+    row_ = "$Periodic\n";
+    AppendLinks(shape_.periodic_axes.size(), row_);
+    for (const int axis : shape_.periodic_axes) {
+      WELLSPACE_ASSIGN_OR_RETURN(const std::vector<VertexPair> pairs, pairs_.Across(axis));
+      const int32_t low = 2 * axis + 1;
+      if (!groups_.part_entities().contains(low) || !groups_.part_entities().contains(low + 1)) {
+        return absl::InternalError(absl::StrCat("a mesh has no boundary across axis ", axis, ", which is periodic"));
+      }
+      AppendLink({.axis = axis,
+                  .entity = groups_.part_entities().at(low + 1),
+                  .master = groups_.part_entities().at(low),
+                  .length = shape_.high[axis] - shape_.low[axis],
+                  .pairs = pairs.size()},
+                 row_);
+      for (const auto& [master, node] : pairs) {
+        AppendPair(uint64_t{node} + 1, uint64_t{master} + 1, row_);
+        output_.Write(row_);
+        row_.clear();
+      }
+    }
+    output_.Write(row_);
+    EndSection("$EndPeriodic");
+    return output_.status();
+  }
+
   // One text, the name; one number, the time; four whole numbers: the step, numbers in a value, values, the partition.
   template <typename Value>
   void WriteNodeData(std::string_view name, Value value) {
@@ -183,6 +244,7 @@ class MshWriter : public MeshWriter {
   uint64_t simplices_ = 0;
   uint64_t facets_ = 0;
   PartWalk walk_{shape_.boundary};
+  PeriodicPairs pairs_{shape_};
   std::vector<double> weights_;
   std::string row_;
 };
@@ -226,6 +288,21 @@ class Msh22Writer final : public MshWriter {
       AppendNumber(uint64_t{corner} + 1, row);
     }
     row += '\n';
+  }
+
+  void AppendLinks(size_t links, std::string& row) const override { absl::StrAppend(&row, links, "\n"); }
+
+  void AppendLink(const PeriodicLink& link, std::string& row) const override {
+    absl::StrAppend(&row, shape_.dimension - 1, " ", link.entity, " ", link.master, "\nAffine");
+    for (const double x : link.Affine()) {
+      row += ' ';
+      AppendNumber(x, row);
+    }
+    absl::StrAppend(&row, "\n", link.pairs, "\n");
+  }
+
+  void AppendPair(uint64_t node, uint64_t master, std::string& row) const override {
+    absl::StrAppend(&row, node, " ", master, "\n");
   }
 
   void AppendData(uint64_t node, double value, std::string& row) const override {
@@ -334,6 +411,25 @@ class Msh41Writer final : public MshWriter {
     for (const uint32_t corner : corners) {
       AppendBytes<uint64_t>(uint64_t{corner} + 1, row);
     }
+  }
+
+  void AppendLinks(size_t links, std::string& row) const override { AppendBytes<uint64_t>(links, row); }
+
+  void AppendLink(const PeriodicLink& link, std::string& row) const override {
+    for (const int32_t value : {static_cast<int32_t>(shape_.dimension - 1), link.entity, link.master}) {
+      AppendBytes(value, row);
+    }
+    const std::array<double, 16> affine = link.Affine();
+    AppendBytes<uint64_t>(affine.size(), row);
+    for (const double x : affine) {
+      AppendBytes(x, row);
+    }
+    AppendBytes(link.pairs, row);
+  }
+
+  void AppendPair(uint64_t node, uint64_t master, std::string& row) const override {
+    AppendBytes(node, row);
+    AppendBytes(master, row);
   }
 
   void AppendData(uint64_t node, double value, std::string& row) const override {

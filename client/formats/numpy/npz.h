@@ -21,6 +21,9 @@ inline constexpr char kNpzFacetNameTags[] = "facet_name_tags.npy";  // the tag o
 // Only of meshes with creases, in 3-D.
 inline constexpr char kNpzRidges[] = "ridges.npy";  // ridge_count x 2, indices of points
 
+// Only of a mesh that is periodic along x, y or z: pairs of vertices, that on the low side first, by ascending such.
+inline constexpr const char* kNpzPeriodic[] = {"periodic_x.npy", "periodic_y.npy", "periodic_z.npy"};
+
 // Only of second order: `simplices` and `facets` have further columns, the nodes at the middles of edges in VTK's
 // order, which are the last rows of `points` and of all data of vertices.
 inline constexpr char kNpzMiddleEnds[] =

@@ -11,6 +11,7 @@
 #include "client/formats/middle_nodes.h"
 #include "client/formats/numpy/npz.h"
 #include "client/formats/numpy/npz_file.h"
+#include "client/formats/periodic_pairs.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::formats {
@@ -26,6 +27,7 @@ class NpzWriter final : public MeshWriter {
 
   absl::Status AddPoints(std::span<const double> points) override {
     file_->Write(points);
+    pairs_.Add(points);
     vertices_ += points.size() / shape_.dimension;
     return file_->status();
   }
@@ -115,6 +117,7 @@ class NpzWriter final : public MeshWriter {
     if (shape_.middles != nullptr) {
       WELLSPACE_RETURN_IF_ERROR(WriteMiddles(*shape_.middles));
     }
+    WELLSPACE_RETURN_IF_ERROR(WritePairs());
     AddNote(file_->ChangesNote());
     WELLSPACE_RETURN_IF_ERROR(file_->status());
     WELLSPACE_RETURN_IF_ERROR(CheckComplete(shape_, {.vertices = vertices_,
@@ -176,6 +179,17 @@ class NpzWriter final : public MeshWriter {
     file_->WriteTexts(kNpzRegionNames, names);
   }
 
+  absl::Status WritePairs() {
+    for (const int axis : shape_.periodic_axes) {
+      WELLSPACE_ASSIGN_OR_RETURN(const std::vector<VertexPair> pairs, pairs_.Across(axis));
+      file_->Begin<uint32_t>(kNpzPeriodic[axis], pairs.size(), 2);
+      for (const VertexPair& pair : pairs) {
+        file_->Write(std::span<const uint32_t>(pair));
+      }
+    }
+    return file_->status();
+  }
+
   absl::Status WriteMiddles(const MiddleNodes& middles) {
     file_->Begin<uint32_t>(kNpzMiddleEnds, middles.count(), 2);
     std::vector<uint32_t> ends;
@@ -208,6 +222,7 @@ class NpzWriter final : public MeshWriter {
 
   const MeshShape shape_;
   const std::unique_ptr<NpzFile> file_;
+  PeriodicPairs pairs_{shape_};
   bool has_weights_ = false;    // the member
   bool has_simplices_ = false;  // the member
   uint64_t vertices_ = 0;

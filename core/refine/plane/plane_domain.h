@@ -35,6 +35,7 @@ class PlaneDomain {
   static constexpr bool kHasFeatures = true;
   static constexpr bool kNotifiesAll = true;
   static constexpr bool kAsksForDistances = true;
+  static constexpr bool kMayHaveImages = false;
 
   // REQUIRES:   `planar` outlives this and all copies; its vertices are those of the structure.
   explicit PlaneDomain(PlanarDomain& planar) : planar_(&planar) {}

@@ -39,6 +39,7 @@ class SpaceDomain {
   static constexpr bool kHasFeatures = true;
   static constexpr bool kNotifiesAll = true;
   static constexpr bool kAsksForDistances = true;
+  static constexpr bool kMayHaveImages = false;
 
   // REQUIRES:   `spatial` outlives this and all copies; its vertices are those of the structure.
   explicit SpaceDomain(SpatialDomain& spatial) : spatial_(&spatial) {}

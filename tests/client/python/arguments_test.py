@@ -26,6 +26,7 @@ FIELDS = {
     "min_dihedral": ("min_dihedral", 0, 0.0),
     "pump_weights": ("pump_weights", True, True),
     "merge_distance": ("merge_distance", 1e-3, 1e-3),
+    "periodic_axes": ("periodic", "xz", [0, 2]),
     "keep_vertices": ("keep_vertices", True, True),
 }
 

@@ -102,6 +102,23 @@ TEST(ParametersFromProto, TakesEveryField) {
   EXPECT_TRUE(parameters->keep_vertices);
 }
 
+TEST(ParametersFromProto, TakesPeriodicAxesInAnyOrder) {
+  v1::MeshParameters message = UnitCubeParameters();
+  message.add_periodic_axes(2);
+  message.add_periodic_axes(0);
+  const absl::StatusOr<core::MeshParameters> parameters = ParametersFromProto(message, SmallLimits());
+  ASSERT_TRUE(parameters.ok()) << parameters.status();
+  EXPECT_THAT(parameters->periodic_axes, ElementsAre(0, 2));
+  EXPECT_THAT(ParametersToProto(*parameters).periodic_axes(), ElementsAre(0, 2));
+  message.add_periodic_axes(3);
+  EXPECT_EQ(ParametersFromProto(message, SmallLimits()).status().message(),
+            "periodic_axes[2]: 3 is no axis in 3-D; 0 to 2 are");
+  message.mutable_periodic_axes()->RemoveLast();
+  message.set_pump_weights(true);
+  EXPECT_THAT(std::string(ParametersFromProto(message, SmallLimits()).status().message()),
+              testing::HasSubstr("not allowed with periodic_axes"));
+}
+
 // An option that is not sent has its default; a session's own parameters can be sent as they are.
 TEST(ParametersFromProto, TellsAZeroFromNothing) {
   v1::MeshParameters message = UnitCubeParameters();

@@ -9,12 +9,12 @@ import os
 import pathlib
 import tempfile
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import IO, Any
 
 import numpy as np
 
-from . import _tool
+from . import _periodic, _tool
 from ._mesh_arrays import MeshArrays
 from ._second_order import second_order
 from .errors import InvalidArgumentError, MissingPackageError
@@ -32,11 +32,17 @@ def save(
     options: dict[str, Any],
     order: int = 1,
     members: dict[str, Any] | None = None,
+    periodic: Sequence[int] = (),
 ) -> None:
     """See Mesh.save. A file that cannot be written to its end is not there. `members`: further arrays of a .npz."""
     target = pathlib.Path(path)
-    if order == 2:
-        _save_second_order(mesh, target, options)
+    if periodic and target.suffix not in (".npz", ".msh"):
+        what = f"{target.suffix or 'a file without an extension'} has no place for pairs; expected .npz or .msh"
+        raise InvalidArgumentError(what, field="periodic")
+    for axis in periodic:
+        _periodic.pairs(mesh, axis)  # told before a file is there
+    if order == 2 or (periodic and target.suffix == ".msh"):
+        _save_by_tool(mesh, target, options, order, periodic)
         return
     if order != 1:
         raise InvalidArgumentError(f"order {order!r}; expected 1 or 2", field="order")
@@ -59,14 +65,20 @@ def save(
     if options:
         raise InvalidArgumentError(f".npz takes no options; got {', '.join(options)}", field=next(iter(options)))
     with replacing(target) as file:
-        np.savez(file, **_members(mesh), **(members or {}))
+        np.savez(file, **_members(mesh), **_pairs(mesh, periodic), **(members or {}))
 
 
-def _save_second_order(mesh: MeshArrays, target: pathlib.Path, options: dict[str, Any]) -> None:
+def _pairs(mesh: MeshArrays, periodic: Sequence[int]) -> dict[str, Any]:
+    return {f"periodic_{_periodic.LETTERS[a]}": _periodic.pairs(mesh, a).astype(np.uint32) for a in periodic}
+
+
+def _save_by_tool(
+    mesh: MeshArrays, target: pathlib.Path, options: dict[str, Any], order: int, periodic: Sequence[int]
+) -> None:
     if options:
-        names = ", ".join(options)
-        raise InvalidArgumentError(f"order 2 takes no options; got {names}", field=next(iter(options)))
-    if target.suffix == ".npz":
+        names, what = ", ".join(options), "order 2" if order == 2 else "periodic"
+        raise InvalidArgumentError(f"{what} takes no options; got {names}", field=next(iter(options)))
+    if target.suffix == ".npz" and not periodic:
         second = second_order(mesh)
         with replacing(target) as file:
             np.savez(file, **_members(second), middle_ends=second.middle_ends.astype(np.uint32, copy=False))
@@ -74,7 +86,8 @@ def _save_second_order(mesh: MeshArrays, target: pathlib.Path, options: dict[str
     with tempfile.TemporaryDirectory(prefix="wellspace-") as folder:
         source = pathlib.Path(folder) / "mesh.npz"
         save(mesh, source, {})
-        _tool.convert(source, target, order=2)
+        axes = ["--periodic", ",".join(_periodic.LETTERS[a] for a in periodic)] if periodic else []
+        _tool.convert(source, target, order=order, options=axes)
 
 
 @contextlib.contextmanager

@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 import functools
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from . import _dual, _files, _second_order, _view
+from . import _dual, _files, _periodic, _second_order, _view
 from ._arrays import coordinates
 from ._dual import DualCells
 from ._located import Located
@@ -117,6 +117,27 @@ class Mesh(MeshArrays):
             )
         return self.simplices[self.regions == number]
 
+    def periodic_pairs(self, axis: int | str) -> npt.NDArray[Any]:
+        """The pairs of vertices on the two sides of the box across an axis, along which the mesh is periodic.
+
+        Parameters
+        ----------
+        axis : int or str
+            0 or ``"x"``, 1 or ``"y"``, 2 or ``"z"``.
+
+        Returns
+        -------
+        (k, 2) int
+            In each row the vertex on the low side, ascending, and the one on the high side with the same other
+            coordinates.
+
+        Raises
+        ------
+        InvalidArgumentError
+            The mesh has no such axis, or vertices on the two sides do not match.
+        """
+        return _periodic.pairs(self, _periodic.axis_of(axis))
+
     def dual_cells(self) -> DualCells:
         """The Voronoi cell of each vertex within the domain, as finite volumes need them. For 2-D and 3-D.
 
@@ -172,7 +193,14 @@ class Mesh(MeshArrays):
             raise InvalidArgumentError(f"order {order!r}; expected 2: the mesh itself is of order 1", field="order")
         return _second_order.second_order(self)
 
-    def save(self, path: str | os.PathLike[str], *, order: int = 1, **options: Any) -> None:
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        order: int = 1,
+        periodic: str | Sequence[int | str] = (),
+        **options: Any,
+    ) -> None:
         """Writes the mesh to a file; the extension says in which format.
 
         ``.npz`` needs nothing else. ``.vtu``, ``.vtkhdf``, ``.vtk``, ``.xdmf``, ``.msh``, ``.mesh``, ``.su2``,
@@ -183,6 +211,9 @@ class Mesh(MeshArrays):
         With ``order=2`` elements are of second order (`to_order`): ``.npz``, which has the arrays of `SecondOrderMesh`,
         and by the tool ``.vtu``, ``.vtkhdf``, ``.vtk``, ``.xdmf``, ``.msh``, ``.inp`` and ``.node``.
 
+        With ``periodic``, the axes along which the mesh is periodic, the file has the pairs of `periodic_pairs`:
+        ``.npz`` in the arrays ``periodic_x`` and so on, ``.msh`` by the tool in ``$Periodic``.
+
         Raises
         ------
         InvalidArgumentError
@@ -192,7 +223,7 @@ class Mesh(MeshArrays):
         OSError
             The file cannot be written; then it is not there.
         """
-        _files.save(self, path, options, order)
+        _files.save(self, path, options, order, _periodic.axes_of(periodic))
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Mesh:

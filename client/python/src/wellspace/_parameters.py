@@ -12,7 +12,7 @@ from typing import Any, TypedDict, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from . import _api
+from . import _api, _periodic
 from ._arrays import Floats, Number, WholeNumber, choice, count, number, row_of_numbers
 from .errors import InvalidArgumentError
 
@@ -76,6 +76,10 @@ class Parameters(TypedDict, total=False):
     merge_distance : float
         Points no farther than this from another one become that one's vertex. In the unit of the points. In a session
         it cannot change. Default 0: equal points only.
+    periodic : str or sequence of int
+        Axes along which the box is periodic, as ``"xy"`` or ``[0, 1]``: for each vertex on one of two opposite sides
+        there is one on the other, and the facets on both match; see `Mesh.periodic_pairs`. For points in 2-D and 3-D,
+        without segments, triangles or `pump_weights`. In a session it cannot change. Default: none.
     keep_vertices : bool
         In a session: vertices of its last mesh stay where they are, and the repair of slivers moves only new ones.
         Default False.
@@ -109,6 +113,7 @@ class Parameters(TypedDict, total=False):
     layers: Number
     pump_weights: bool
     merge_distance: Number
+    periodic: str | Sequence[int | str]
     keep_vertices: bool
     box: npt.ArrayLike
     margin: Number
@@ -189,6 +194,9 @@ def fill(message: Any, dimension: int, given: Mapping[str, Any]) -> Any:
     for name in ("pump_weights", "keep_vertices"):
         if name in given:
             setattr(message, name, bool(given[name]))
+    if "periodic" in given:
+        del message.periodic_axes[:]
+        message.periodic_axes.extend(_periodic.axes_of(given["periodic"]))
     if "max_vertices" in given:
         message.max_vertices = count(given["max_vertices"], "max_vertices")
     if "threads" in given:
@@ -284,6 +292,8 @@ def read(message: Any) -> dict[str, Any]:
     for name in ("pump_weights", "keep_vertices", "max_vertices", "threads"):
         if getattr(message, name):
             found[name] = getattr(message, name)
+    if message.periodic_axes:
+        found["periodic"] = "".join(_periodic.LETTERS[axis] for axis in message.periodic_axes)
     if message.HasField("domain"):
         found["box"] = (tuple(message.domain.low), tuple(message.domain.high))
     if message.size_boxes:

@@ -27,6 +27,7 @@ _ARGUMENTS = {
     "min_dihedral": "min_dihedral",
     "pump_weights": "pump_weights",
     "merge_distance": "merge_distance",
+    "periodic_axes": "periodic",
     "keep_vertices": "keep_vertices",
 }
 
