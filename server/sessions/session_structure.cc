@@ -152,7 +152,8 @@ bool Session::HasCut(const MeshSnapshot& mesh, const core::PartitionOptions& opt
 bool Session::HasLocator(uint64_t revision) const {
   absl::MutexLock lock(&mutex_);
   const uint64_t last = work_.mesh == nullptr ? 0 : work_.mesh->revision();
-  return last != 0 && (locator_.Find(revision == 0 ? last : revision) != nullptr || earlier_locator_.Find(revision) != nullptr);
+  return last != 0 &&
+         (locator_.Find(revision == 0 ? last : revision) != nullptr || earlier_locator_.Find(revision) != nullptr);
 }
 
 // One AddVertices: its parts, in their order.
