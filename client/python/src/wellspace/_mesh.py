@@ -223,7 +223,7 @@ class Mesh(MeshArrays):
         OSError
             The file cannot be written; then it is not there.
         """
-        _files.save(self, path, options, order, _periodic.axes_of(periodic))
+        _files.save(self, path, options, order, periodic=_periodic.axes_of(periodic))
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Mesh:
