@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "absl/container/flat_hash_map.h"
@@ -77,12 +79,14 @@ class NearLookup {
   absl::flat_hash_map<Cube, std::vector<Point<D>>> cubes_;
 };
 
-// The first of `cloud`, n x D, that the mesh does not have, if there is one. A point is there if it is the next of the
-// vertices `points`, to the bit, or if it is no farther than `distance` from a vertex that a point of the cloud is.
+// The first of `cloud`, n x D, that the mesh does not have, if there is one. A point is there if it is one of the
+// first of the vertices `points`, to the bit, or if it is no farther than `distance` from a vertex that a point of the
+// cloud is. The first may be in any order: a vertex has its number by the first point that became it, which need not be
+// the one that stayed.
 //
 // Shapes:     cloud and points: row-major.
 // REQUIRES:   0 < distance, finite.
-// Complexity: O(n) expected, if few points of the cloud that are vertices are that near to each other.
+// Complexity: O(n + vertices) expected, if few points of the cloud that are vertices are that near to each other.
 // Errors:     none.
 template <int D>
 std::optional<size_t> FirstMissingOfMerged(std::span<const double> cloud, std::span<const double> points,
@@ -92,20 +96,33 @@ std::optional<size_t> FirstMissingOfMerged(std::span<const double> cloud, std::s
     std::copy_n(rows.begin() + static_cast<std::ptrdiff_t>(i * D), D, p.begin());
     return p;
   };
+  const auto bits = [](const Point<D>& p) {
+    std::array<uint64_t, D> of;
+    std::ranges::transform(p, of.begin(), [](double x) { return std::bit_cast<uint64_t>(x); });
+    return of;
+  };
+  absl::flat_hash_map<std::array<uint64_t, D>, size_t> vertices;
+  vertices.reserve(points.size() / D);
+  for (size_t v = 0; v < points.size() / D; ++v) {
+    vertices.emplace(bits(point(points, v)), v);
+  }
   NearLookup<D> kept(distance);
   std::vector<size_t> merged;
-  size_t vertex = 0;
+  std::vector<std::pair<size_t, size_t>> stayed;  // vertex and point
   for (size_t i = 0; i < cloud.size() / D; ++i) {
     const Point<D> p = point(cloud, i);
-    const bool is_next =
-        vertex < points.size() / D && std::ranges::equal(p, point(points, vertex), [](double a, double b) {
-          return a == b && std::signbit(a) == std::signbit(b);
-        });
-    if (is_next) {
-      kept.Add(p);
-      ++vertex;
-    } else {
+    if (const auto found = vertices.find(bits(p)); found == vertices.end()) {
       merged.push_back(i);
+    } else {
+      kept.Add(p);
+      stayed.emplace_back(found->second, i);
+    }
+  }
+  std::ranges::sort(stayed);
+  for (size_t k = 0, first = 0; k < stayed.size(); ++k) {
+    first += k > 0 && stayed[k].first != stayed[k - 1].first ? 1 : 0;
+    if (stayed[k].first != first) {
+      return stayed[k].second;  // it is a vertex that was added
     }
   }
   for (const size_t i : merged) {

@@ -13,6 +13,7 @@
 
 #include "core/input/near_points.h"
 #include "core/meshers/mesher.h"
+#include "core/validate/validate.h"
 #include "tests/support/seeded_test.h"
 
 namespace wellspace::core {
@@ -119,6 +120,25 @@ TEST_F(MergeTest, IsToldInTheMesh) {
     EXPECT_EQ(mesh->statistics.merged_points, merged);
     EXPECT_EQ(mesh->statistics.input_points, 150u);
     EXPECT_EQ(mesh->statistics.duplicates, 150 - stay - merged);
+  }
+}
+
+// A vertex has its number by the first point that became it, which need not be the one that stayed.
+TEST_F(MergeTest, MeshesOfMergedCloudsAreValid) {
+  for (const int dimension : {2, 3}) {
+    for (int round = 0; round < 10; ++round) {
+      std::vector<double> points;
+      while (points.size() < size_t{200} * dimension) {
+        points.push_back(random_.Unit());
+      }
+      const auto mesh = MeshOf({.dimension = dimension, .merge_distance = 0.1}, points);
+      ASSERT_TRUE(mesh.ok()) << mesh.status();
+      const MeshView view{dimension, mesh->points, mesh->simplices, mesh->weights};
+      EXPECT_EQ(ValidateCloud(view, points, 0.1), absl::OkStatus());
+      std::vector<double> more = points;
+      more.insert(more.end(), dimension, -0.2);  // in the box, and far from all
+      EXPECT_THAT(std::string(ValidateCloud(view, more, 0.1).message()), HasSubstr("point 200 of the cloud"));
+    }
   }
 }
 
