@@ -32,7 +32,7 @@
 //   vtk   VTK's legacy format in ascii or binary, of the kinds POLYDATA, UNSTRUCTURED_GRID, STRUCTURED_GRID,
 //         STRUCTURED_POINTS and RECTILINEAR_GRID.
 //   vtp, vts, vtu, vtr, vti  VTK's XML, the points of all pieces, arrays as ReadMesh takes them. Of grids and images
-//         whose points are told by their axes alone, at most 2^20 points and 1024 for each byte of the file.
+//         whose points are told by their axes alone, at most 2^20 points and 64 for each byte of the file.
 //   pvtp, pvts, pvtu, pvtr, pvti  VTK's files of pieces, each of which is a file beside it; points that pieces have in
 //         common come as often.
 //   msh   Gmsh's, versions as ReadMesh takes them: all nodes, whatever the elements are.

@@ -57,8 +57,10 @@ size_t CountImages(const PeriodicBox<D>& box, std::span<const double> points) {
 }
 
 absl::Status ExplainImages(const absl::Status& status) {
-  absl::Status explained(
-      status.code(), absl::StrCat(status.message(), "; the image of a point across a periodic box counts as a point"));
+  absl::Status explained(status.code(),
+                         absl::StrCat(status.message(),
+                                      "; the image of a point across a periodic box counts as a point, and points "
+                                      "are not merged with images: give both sides the same coordinates along them"));
   status.ForEachPayload([&](absl::string_view url, const absl::Cord& payload) { explained.SetPayload(url, payload); });
   return explained;
 }

@@ -142,7 +142,7 @@ absl::StatusOr<CarriedField> PlaceTransfer<D>::Run() {
 
 template <int D>
 absl::Status PlaceTransfer<D>::CopyKept() {
-  carried_.values.resize(rows() * field_.components);
+  WELLSPACE_RETURN_IF_ERROR(Fill(carried_.values, rows() * field_.components, 0, run_.context));
   for (size_t row = 0; is_linear_ && row < rows(); ++row) {
     if (row % kStepsBetweenChecks == 0) {
       WELLSPACE_RETURN_IF_ERROR(run_.context.Check());

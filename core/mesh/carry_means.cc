@@ -1,6 +1,7 @@
 #include "core/mesh/carry_means.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -33,6 +34,9 @@ struct Part {
   double part;
 };
 
+// Parts of a block beyond which its memory is not kept for the next round.
+constexpr size_t kMostPartsKept = size_t{1} << 14;
+
 // The parts of some old simplices, one after the other.
 struct PartsOfBlock {
   std::vector<Part> parts;
@@ -64,9 +68,11 @@ class MeanTransfer {
   // Hands the mass of each old simplex out to the new ones.
   absl::Status Distribute();
   // The parts of the old simplices from `begin` to `end`.
-  absl::Status FillBlock(size_t begin, size_t end, PartsOfBlock* block) const;
+  absl::Status FillBlock(size_t begin, size_t end, PartsOfBlock* block);
   // The parts of the old simplex `s` that new ones have, behind those in `parts`; of a covered one they add up to 1.
-  void FindParts(size_t s, std::vector<Part>* parts) const;
+  absl::Status FindParts(size_t s, std::vector<Part>* parts);
+  // Asks for the memory of so many more parts of this round, beyond those that are counted in Bytes.
+  absl::Status AllowParts(uint64_t more);
   absl::Status HandOut(size_t s, std::span<const Part> parts);
   // Makes values of the masses.
   absl::StatusOr<CarriedField> Finish();
@@ -79,13 +85,14 @@ class MeanTransfer {
   const CarryRun& run_;
 
   double scale_ = 1;
-  HugeVector<uint32_t> twins_;     // of the new simplices
-  std::vector<bool> has_twin_;     // of the old simplices
-  ChangedSimplices<D> changed_;    // of the new simplices
-  HugeVector<double> volumes_;     // of the new simplices
-  HugeVector<double> covered_;     // of the new simplices: the volume that old ones have
-  HugeVector<double> masses_;      // new simplices x components
-  HugeVector<double> low_, high_;  // of the values that the masses are made of
+  HugeVector<uint32_t> twins_;       // of the new simplices
+  std::vector<bool> has_twin_;       // of the old simplices
+  ChangedSimplices<D> changed_;      // of the new simplices
+  HugeVector<double> volumes_;       // of the new simplices
+  HugeVector<double> covered_;       // of the new simplices: the volume that old ones have
+  HugeVector<double> masses_;        // new simplices x components
+  HugeVector<double> low_, high_;    // of the values that the masses are made of
+  std::atomic<uint64_t> parts_ = 0;  // of the round
 };
 
 template <int D>
@@ -93,7 +100,7 @@ uint64_t MeanTransfer<D>::Bytes() const {
   const uint64_t onto = onto_count();
   return TwinBytes(from_count(), onto, onto_.points.size() / D) + from_count() / 8 +
          onto * sizeof(double) * (2 + 4 * field_.components) +
-         // A block has few old simplices, which have few parts each, or overlap all new ones.
+         // Of a round, mostly. Where old simplices overlap many new ones, AllowParts asks for more.
          2 * onto * sizeof(Part) + ChangedSimplices<D>::BytesFor(onto, onto_.points.size() / D);
 }
 
@@ -115,6 +122,7 @@ absl::Status MeanTransfer<D>::Prepare() {
   }
   double largest = 0;
   for (const MeshView& mesh : {from_, onto_}) {
+    WELLSPACE_RETURN_IF_ERROR(run_.context.Check());
     for (const double x : mesh.points) {
       largest = std::max(largest, std::abs(x));
     }
@@ -129,11 +137,12 @@ absl::Status MeanTransfer<D>::Prepare() {
     }
     volumes_[t] = VolumeOf(CornersOf<D>(onto_, t));
   }
-  covered_.assign(onto_count(), 0);
-  masses_.assign(onto_count() * field_.components, 0);
-  low_.assign(masses_.size(), std::numeric_limits<double>::infinity());
-  high_.assign(masses_.size(), -std::numeric_limits<double>::infinity());
-  return absl::OkStatus();
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const size_t numbers = onto_count() * field_.components;
+  WELLSPACE_RETURN_IF_ERROR(Fill(covered_, onto_count(), 0, run_.context));
+  WELLSPACE_RETURN_IF_ERROR(Fill(masses_, numbers, 0, run_.context));
+  WELLSPACE_RETURN_IF_ERROR(Fill(low_, numbers, kInfinity, run_.context));
+  return Fill(high_, numbers, -kInfinity, run_.context);
 }
 
 template <int D>
@@ -144,6 +153,7 @@ absl::Status MeanTransfer<D>::Distribute() {
     const auto first_of = [&](size_t block) { return std::min(from_count(), begin + block * kSimplicesOfABlock); };
     WELLSPACE_RETURN_IF_ERROR(team.TryForEach(
         blocks.size(), [&](size_t block) { return FillBlock(first_of(block), first_of(block + 1), &blocks[block]); }));
+    parts_ = 0;
     // In their order, so that sums are the same on any number of threads.
     for (size_t block = 0; block < blocks.size(); ++block) {
       size_t part = 0;
@@ -152,13 +162,25 @@ absl::Status MeanTransfer<D>::Distribute() {
         WELLSPACE_RETURN_IF_ERROR(HandOut(s, std::span(blocks[block].parts).subspan(part, end - part)));
         part = end;
       }
+      if (blocks[block].parts.capacity() > kMostPartsKept) {
+        blocks[block].parts = {};
+      }
     }
   }
   return absl::OkStatus();
 }
 
 template <int D>
-absl::Status MeanTransfer<D>::FillBlock(size_t begin, size_t end, PartsOfBlock* block) const {
+absl::Status MeanTransfer<D>::AllowParts(uint64_t more) {
+  const uint64_t parts = parts_ += more;
+  // Vectors grow by doubling, and hold the parts before then.
+  const uint64_t bytes = 3 * parts * sizeof(Part);
+  const uint64_t counted = 2 * onto_count() * sizeof(Part);
+  return bytes <= counted ? absl::OkStatus() : run_.context.AllowMemory(run_.held_bytes + Bytes() + bytes - counted);
+}
+
+template <int D>
+absl::Status MeanTransfer<D>::FillBlock(size_t begin, size_t end, PartsOfBlock* block) {
   block->parts.clear();
   block->ends.clear();
   for (size_t s = begin; s < end; ++s) {
@@ -166,7 +188,7 @@ absl::Status MeanTransfer<D>::FillBlock(size_t begin, size_t end, PartsOfBlock* 
       WELLSPACE_RETURN_IF_ERROR(run_.context.Check());
     }
     if (!has_twin_[s]) {
-      FindParts(s, &block->parts);
+      WELLSPACE_RETURN_IF_ERROR(FindParts(s, &block->parts));
     }
     block->ends.push_back(block->parts.size());
   }
@@ -174,11 +196,11 @@ absl::Status MeanTransfer<D>::FillBlock(size_t begin, size_t end, PartsOfBlock* 
 }
 
 template <int D>
-void MeanTransfer<D>::FindParts(size_t s, std::vector<Part>* parts) const {
+absl::Status MeanTransfer<D>::FindParts(size_t s, std::vector<Part>* parts) {
   const Simplex<D> corners = CornersOf<D>(from_, s);
   const double volume = VolumeOf(corners);
   if (!(volume > 0)) {
-    return;
+    return absl::OkStatus();
   }
   Box<D> box{corners[0], corners[0]};
   for (const Point<D>& corner : corners) {
@@ -186,8 +208,9 @@ void MeanTransfer<D>::FindParts(size_t s, std::vector<Part>* parts) const {
   }
   const size_t first = parts->size();
   double sum = 0;
+  absl::Status status;
   changed_.locator.ForEachNear(box, [&](uint32_t k) {
-    if (run_.context.IsCancelled()) {  // one may overlap all new ones
+    if (!status.ok() || run_.context.IsCancelled()) {  // one may overlap all new ones
       return;
     }
     const uint32_t t = changed_.numbers[k];
@@ -198,13 +221,18 @@ void MeanTransfer<D>::FindParts(size_t s, std::vector<Part>* parts) const {
     if (part > kLeastPart || part * volume > kLeastPart * volumes_[t]) {
       parts->push_back({t, part});
       sum += part;
+      if (parts->size() % kPartsBetweenChecks == 0) {
+        status = AllowParts(kPartsBetweenChecks);
+      }
     }
   });
+  WELLSPACE_RETURN_IF_ERROR(status);
   if (sum >= 1 - kUncovered) {
     for (size_t k = first; k < parts->size(); ++k) {
       (*parts)[k].part /= sum;
     }
   }
+  return run_.context.Check();
 }
 
 template <int D>
@@ -231,7 +259,7 @@ absl::Status MeanTransfer<D>::HandOut(size_t s, std::span<const Part> parts) {
 template <int D>
 absl::StatusOr<CarriedField> MeanTransfer<D>::Finish() {
   CarriedField carried;
-  carried.values.resize(masses_.size());
+  WELLSPACE_RETURN_IF_ERROR(Fill(carried.values, masses_.size(), 0, run_.context));
   std::vector<uint32_t> outside;
   for (size_t t = 0; t < onto_count(); ++t) {
     if (t % kStepsBetweenChecks == 0) {

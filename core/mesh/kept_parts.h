@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "core/base/cancellable_sort.h"
 #include "core/base/memory/huge_pages.h"
 #include "core/base/run_context.h"
 #include "core/base/status_macros.h"
@@ -35,7 +36,7 @@ class TwinSearch {
 
   // For each simplex of `onto` the one of `from` that has the same vertices, all of them kept; kNoSimplex for others.
   //
-  // Complexity: O(n), for vertices of few simplices each.
+  // Complexity: O(n log k) for vertices of at most k simplices.
   // Errors:     CANCELLED, DEADLINE_EXCEEDED.
   absl::StatusOr<HugeVector<uint32_t>> Run() {
     WELLSPACE_RETURN_IF_ERROR(FindKept());
@@ -69,6 +70,7 @@ class TwinSearch {
   // Those that are left, by their lowest vertex.
   absl::Status MatchOthers();
   absl::Status SortByVertex();
+  absl::Status SortEachVertex();
 
   const MeshView& from_;
   const MeshView& onto_;
@@ -138,6 +140,31 @@ absl::Status TwinSearch<D>::SortByVertex() {
       ends_[v] += ends_[v - 1];
     }
   }
+  return SortEachVertex();
+}
+
+// Sorts the simplices of each lowest vertex by their others: of a fan all have the same one.
+template <int D>
+absl::Status TwinSearch<D>::SortEachVertex() {
+  constexpr size_t kFew = size_t{1} << 12;
+  const auto is_before = [&](uint32_t a, uint32_t b) { return SortedRowOf(from_, a) < SortedRowOf(from_, b); };
+  size_t sorted = 0;
+  for (size_t v = 0, begin = 0; v + 1 < ends_.size(); begin = ends_[v], ++v) {
+    const auto first = by_vertex_.begin() + begin;
+    const auto last = by_vertex_.begin() + ends_[v];
+    if (last - first <= static_cast<std::ptrdiff_t>(kFew)) {
+      std::sort(first, last, is_before);
+    } else {
+      std::vector<uint32_t> many(first, last);
+      WELLSPACE_RETURN_IF_ERROR(CancellableSort(many, is_before, context_));
+      std::copy(many.begin(), many.end(), first);
+    }
+    sorted += last - first + 1;
+    if (sorted >= kFew) {
+      sorted = 0;
+      WELLSPACE_RETURN_IF_ERROR(context_.Check());
+    }
+  }
   return absl::OkStatus();
 }
 
@@ -150,11 +177,12 @@ absl::Status TwinSearch<D>::MatchOthers() {
       continue;
     }
     const Corners corners = SortedRowOf(onto_, i);
-    for (size_t k = corners[0] == 0 ? 0 : ends_[corners[0] - 1]; k < ends_[corners[0]]; ++k) {
-      if (SortedRowOf(from_, by_vertex_[k]) == corners) {
-        twins_[i] = by_vertex_[k];
-        break;
-      }
+    const auto begin = by_vertex_.begin() + (corners[0] == 0 ? 0 : ends_[corners[0] - 1]);
+    const auto end = by_vertex_.begin() + ends_[corners[0]];
+    const auto found = std::lower_bound(
+        begin, end, corners, [&](uint32_t k, const Corners& wanted) { return SortedRowOf(from_, k) < wanted; });
+    if (found != end && SortedRowOf(from_, *found) == corners) {
+      twins_[i] = *found;
     }
   }
   return absl::OkStatus();

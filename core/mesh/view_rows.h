@@ -2,8 +2,12 @@
 #ifndef WELLSPACE_CORE_MESH_VIEW_ROWS_H_
 #define WELLSPACE_CORE_MESH_VIEW_ROWS_H_
 
+#include <algorithm>
 #include <cstddef>
 
+#include "absl/status/status.h"
+#include "core/base/run_context.h"
+#include "core/base/status_macros.h"
 #include "core/geometry/exact_measure.h"
 #include "core/geometry/point.h"
 #include "core/validate/validate.h"
@@ -29,6 +33,21 @@ Point<D> CentroidOf(const Simplex<D>& corners) {
     }
   }
   return centroid;
+}
+
+// Makes `numbers` so many times `value`, a block at a time.
+//
+// Errors:     CANCELLED, DEADLINE_EXCEEDED.
+template <typename Numbers>
+absl::Status Fill(Numbers& numbers, size_t count, double value, const RunContext& context) {
+  constexpr size_t kBlock = size_t{1} << 20;
+  numbers.clear();
+  numbers.reserve(count);
+  while (numbers.size() < count) {
+    WELLSPACE_RETURN_IF_ERROR(context.Check());
+    numbers.resize(std::min(count, numbers.size() + kBlock), value);
+  }
+  return absl::OkStatus();
 }
 
 }  // namespace wellspace::core

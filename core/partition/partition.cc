@@ -233,7 +233,11 @@ absl::StatusOr<DualGraph> FindDualGraph(int dimension, std::span<const uint32_t>
   }
   graph.neighbours.resize(2 * pairs.size());
   HugeVector<int32_t> next(graph.first.begin(), graph.first.end());
-  for (const auto& [a, b] : pairs) {
+  for (size_t i = 0; i < pairs.size(); ++i) {
+    if (i % kStepsBetweenChecks == 0) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+    }
+    const auto& [a, b] = pairs[i];
     graph.neighbours[next[a]++] = b;
     graph.neighbours[next[b]++] = a;
   }

@@ -31,6 +31,10 @@ class Flips {
       : points_(points), simplices_(simplices), solids_(solids), context_(context) {}
 
   absl::StatusOr<uint64_t> Run() {
+    for (size_t i = 0; i < points_.size(); ++i) {
+      WELLSPACE_RETURN_IF_ERROR(CheckAt(i, context_));
+      largest_ = std::max(largest_, std::abs(points_[i]));
+    }
     std::vector<uint32_t> flat;
     for (uint32_t s = 0; s < solids_.size(); ++s) {
       WELLSPACE_RETURN_IF_ERROR(CheckAt(s, context_));
@@ -87,7 +91,7 @@ class Flips {
     for (size_t k = 0; k < 3; ++k) {
       longest_sq = std::max(longest_sq, DistanceSq<3>(edges[k], edges[(k + 1) % 3]));
     }
-    const double most = std::min(kFlatAltitude, kFlatShare * std::sqrt(longest_sq));
+    const double most = std::min(kFlatAltitude * largest_, kFlatShare * std::sqrt(longest_sq));
     return std::abs(Dot<3>(across, edges[2])) <= most * std::sqrt(area_sq);
   }
 
@@ -252,6 +256,7 @@ class Flips {
   const RunContext& context_;
   absl::flat_hash_map<uint32_t, std::vector<uint32_t>> around_;  // by vertex of a flat one: tetrahedra, ascending
   std::vector<bool> is_gone_;                                    // by tetrahedron
+  double largest_ = 0;                                           // of all coordinates, without signs
   size_t looked_at_ = 0;
 };
 

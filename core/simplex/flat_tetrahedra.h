@@ -11,8 +11,8 @@
 
 namespace wellspace::core {
 
-// The altitude, in the unit of points whose box has sides of about 1, up to which a tetrahedron is flat: some thousand
-// units in the last place of a coordinate. Relative to its longest edge it is kFlatShare.
+// The altitude, relative to the largest coordinate, up to which a tetrahedron is flat: some thousand units in the last
+// place of that. Relative to its longest edge it is kFlatShare.
 inline constexpr double kFlatAltitude = 1e-12;
 inline constexpr double kFlatShare = 1e-6;
 

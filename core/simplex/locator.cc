@@ -144,6 +144,9 @@ absl::StatusOr<Locator<D>> Locator<D>::Create(std::span<const double> points, st
   }
   locator.all_ = BoxAround<D>(locator.CornersOf(0));
   for (size_t i = 0; i < points.size(); i += D) {
+    if (i % kStepsBetweenChecks < D) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+    }
     Point<D> p;
     std::copy_n(&points[i], D, p.begin());
     locator.all_.Include(Box<D>{p, p});

@@ -6,7 +6,6 @@
 #include <functional>
 #include <memory>
 #include <mutex>
-#include <string>
 #include <utility>
 
 #include "absl/time/clock.h"
@@ -182,8 +181,9 @@ void Call<Reactor>::FinishNow() {
   if (const std::string cause(final_status_.message()); WithoutFolders(cause) != cause) {
     figures.Add("cause", cause);
   }
-  if (const std::string owner = OwnerAddressOf(final_status_); !owner.empty()) {
-    context_->AddTrailingMetadata(kOwnerMetadata, owner);
+  if (const SessionOwnerOf owner = OwnerOf(final_status_); !owner.address.empty()) {
+    context_->AddTrailingMetadata(kSessionMetadata, owner.session);
+    context_->AddTrailingMetadata(kOwnerMetadata, owner.address);
   }
   environment_.observability.calls().Note(context_, figures);
   this->Finish(ToGrpcStatus(final_status_));

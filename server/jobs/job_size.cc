@@ -138,4 +138,10 @@ bool IsSmallPart(bool is_cut, uint64_t simplices) {
   return simplices <= (is_cut ? kMostTakenFrom : kMostCut);
 }
 
+bool IsSmallTransfer(uint64_t simplices, uint64_t components) {
+  constexpr uint64_t kMostSearched = 1'000'000;
+  constexpr uint64_t kMostNumbers = 4'000'000;
+  return simplices <= kMostSearched && simplices * components <= kMostNumbers;
+}
+
 }  // namespace wellspace::server

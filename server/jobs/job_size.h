@@ -31,6 +31,9 @@ bool IsSmallAddition(uint64_t points, uint64_t vertices, uint64_t steps);
 // As above, of a part of a mesh that is taken out of it, which may have to be cut first.
 bool IsSmallPart(bool is_cut, uint64_t simplices);
 
+// As above, of values, so many by vertex or simplex, that are carried between meshes of at most so many simplices.
+bool IsSmallTransfer(uint64_t simplices, uint64_t components);
+
 }  // namespace wellspace::server
 
 #endif  // WELLSPACE_SERVER_JOBS_JOB_SIZE_H_

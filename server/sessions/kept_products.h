@@ -63,12 +63,17 @@ class KeptProducts {
     if (Made found = Find(mesh->revision(), fits); found != nullptr) {
       return found;
     }
+    {
+      std::lock_guard lock(mutex_);
+      is_replaced_ = false;
+    }
     is_making_ = true;
     const absl::Cleanup end = [this] { is_making_ = false; };
     (void)MakePlaceFor(mesh->revision());  // freed without mutex_, and before another takes memory
     WELLSPACE_ASSIGN_OR_RETURN(Made made, make(*mesh));
     std::lock_guard lock(mutex_);
-    if (kept_.empty() || kept_.front()->revision == made->revision) {
+    // Not one of a mesh that was replaced meanwhile: nobody would take it away.
+    if (!is_replaced_ && (kept_.empty() || kept_.front()->revision == made->revision)) {
       kept_.push_back(made);
     }
     return made;
@@ -104,6 +109,7 @@ class KeptProducts {
   [[nodiscard]] std::vector<Made> Replace(std::vector<Made> products) {
     std::lock_guard lock(mutex_);
     std::vector<Made> before = TakeIf([](const Made&) { return true; });
+    is_replaced_ = true;
     kept_.assign(std::make_move_iterator(products.begin()), std::make_move_iterator(products.end()));
     return before;
   }
@@ -157,6 +163,7 @@ class KeptProducts {
   mutable std::mutex mutex_;  // after that of the session
   std::deque<Made> kept_;     // guarded by mutex_; the oldest first
   uint64_t asked_for_ = 0;    // guarded by mutex_; the last revision; 0: none
+  bool is_replaced_ = false;  // guarded by mutex_; since the last product was begun
 };
 
 }  // namespace wellspace::server

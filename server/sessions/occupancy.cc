@@ -10,7 +10,7 @@ absl::Status Elsewhere(const std::string& session, const std::string& address) {
   return SessionElsewhereError(address.empty()
                                    ? absl::StrCat(session, " has been taken over by another server; ask that one")
                                    : absl::StrCat(session, " is at another server, ", address, "; ask that one"),
-                               address);
+                               session.substr(session.find('/') + 1), address);
 }
 
 absl::Status NoSuchSession(const std::string& session) {

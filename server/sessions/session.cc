@@ -317,7 +317,9 @@ absl::StatusOr<std::shared_ptr<const MeshSnapshot>> Session::KeptMesh(uint64_t r
       absl::StrCat("the mesh of revision ", revision, " is not kept; ", name(), " has that of revision ",
                    work_.mesh->revision(),
                    earlier_mesh_ == nullptr ? " alone" : absl::StrCat(" and that of ", earlier_mesh_->revision()),
-                   ". Of earlier ones that which was downloaded last is kept, while memory allows it"));
+                   ". Of earlier ones that which was downloaded, or located points in, last is kept, while memory "
+                   "allows it"),
+      "start.from_revision");
 }
 
 std::shared_ptr<const MeshSnapshot> Session::mesh() const {

@@ -242,8 +242,13 @@ void Session::YieldEarlierMesh() {
 
 Session::Retired Session::RetireMesh() {
   const uint64_t revision = work_.mesh->revision();
-  if (!deltas_.WasDownloaded(revision) && !locator_.WasAskedFor(revision)) {
+  if (!deltas_.WasDownloaded(revision) && !locator_.WasAskedFor(revision) && !cuts_.WasAskedFor(revision)) {
     return {.located = {}, .mesh = nullptr};  // no client has values on it; they may on the one before
+  }
+  const uint64_t epoch = work_.mesh->record().epoch();
+  if (epoch != 0 && epoch != state_->epoch) {
+    // Another owner has made the file, and no record names it any more: whoever clears the folder up may take it.
+    return {.located = {}, .mesh = nullptr};
   }
   return {.located = earlier_locator_.Replace(locator_.Drop()), .mesh = std::exchange(earlier_mesh_, work_.mesh)};
 }

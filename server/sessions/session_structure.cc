@@ -119,12 +119,16 @@ absl::StatusOr<std::shared_ptr<const LocatedMesh>> Session::PrepareLocator(uint6
     absl::MutexLock lock(&mutex_);
     WELLSPACE_RETURN_IF_ERROR(CheckOpen(occupancy_, name()));
     WELLSPACE_RETURN_IF_ERROR(CheckMesh(*state_));
+    if (revision != 0 && earlier_mesh_ != nullptr && revision == earlier_mesh_->revision()) {
+      return earlier_mesh_;  // it was the last one before the wait
+    }
     if (revision != 0 && revision != work_.mesh->revision()) {
       const std::string kept =
           earlier_mesh_ == nullptr ? "" : absl::StrCat(", and the one that is kept, of ", earlier_mesh_->revision());
       return MakeError(v1::ERROR_REASON_REVISION_MISMATCH,
                        absl::StrCat("revision is ", revision, ", but the mesh of ", name(), " is of revision ",
-                                    work_.mesh->revision(), kept));
+                                    work_.mesh->revision(), kept),
+                       "revision");
     }
     return work_.mesh;
   };

@@ -10,8 +10,11 @@ SessionUse::SessionUse(std::shared_ptr<Session> session) : session_(std::move(se
 }
 
 SessionUse::~SessionUse() {
-  absl::MutexLock lock(&session_->mutex_);
-  session_->occupancy_.lease.EndUse(session_->clock_.since_boot());
+  {
+    absl::MutexLock lock(&session_->mutex_);
+    session_->occupancy_.lease.EndUse(session_->clock_.since_boot());
+  }
+  session_->NoteIdle();  // its earlier mesh may have been in use
 }
 
 std::unique_ptr<UploadUse> UploadUse::Begin(std::shared_ptr<Session> session) {

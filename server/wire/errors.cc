@@ -28,6 +28,7 @@ constexpr char kReason[] = "wellspace.v1/reason";
 constexpr char kField[] = "wellspace.v1/field";
 constexpr char kMayRetry[] = "wellspace.v1/may_retry";
 constexpr char kAddress[] = "wellspace.v1/address";
+constexpr char kSession[] = "wellspace.v1/session";
 
 absl::string_view ToAbsl(std::string_view text) { return {text.data(), text.size()}; }
 
@@ -169,8 +170,8 @@ google::rpc::Status DetailsOf(const absl::Status& status, const std::string& rea
   google::rpc::ErrorInfo info;
   info.set_reason(reason);
   info.set_domain(kErrorDomain);
-  if (const std::string address = OwnerAddressOf(status); !address.empty()) {
-    (*info.mutable_metadata())["address"] = address;
+  if (const SessionOwnerOf owner = OwnerOf(status); !owner.address.empty()) {
+    (*info.mutable_metadata())["address"] = owner.address;
   }
   details.add_details()->PackFrom(info);
   if (const absl::optional<absl::Cord> field = status.GetPayload(kField); field.has_value()) {
@@ -214,17 +215,21 @@ bool IsMemoryLimit(const absl::Status& status) {
   return status.GetPayload(kReason) == absl::Cord(v1::ErrorReason_Name(v1::ERROR_REASON_MEMORY_LIMIT));
 }
 
-absl::Status SessionElsewhereError(std::string_view message, std::string_view address) {
+absl::Status SessionElsewhereError(std::string_view message, std::string_view session, std::string_view address) {
   absl::Status status = MakeError(v1::ERROR_REASON_SESSION_ELSEWHERE, message);
   if (!address.empty()) {
     status.SetPayload(kAddress, absl::Cord(ToAbsl(address)));
+    status.SetPayload(kSession, absl::Cord(ToAbsl(session)));
   }
   return status;
 }
 
-std::string OwnerAddressOf(const absl::Status& status) {
+SessionOwnerOf OwnerOf(const absl::Status& status) {
   const absl::optional<absl::Cord> address = status.GetPayload(kAddress);
-  return address.has_value() ? std::string(*address) : std::string();
+  const absl::optional<absl::Cord> session = status.GetPayload(kSession);
+  return address.has_value() && session.has_value()
+             ? SessionOwnerOf{.session = std::string(*session), .address = std::string(*address)}
+             : SessionOwnerOf();
 }
 
 grpc::Status ToGrpcStatus(const absl::Status& status) {

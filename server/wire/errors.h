@@ -29,10 +29,14 @@ absl::Status OfSurface(const absl::Status& status);
 // A MEMORY_LIMIT, which passes with time or does not.
 absl::Status MemoryLimitError(std::string_view message, bool may_retry);
 bool IsMemoryLimit(const absl::Status& status);
-// A SESSION_ELSEWHERE. `address`: where the server is that has the session; empty: unknown.
-absl::Status SessionElsewhereError(std::string_view message, std::string_view address);
-// The address of such a status; empty: it has none.
-std::string OwnerAddressOf(const absl::Status& status);
+// A SESSION_ELSEWHERE of the session with this id. `address`: where the server is that has it; empty: unknown.
+absl::Status SessionElsewhereError(std::string_view message, std::string_view session, std::string_view address);
+// Of such a status the id, and the address; both are empty where one is not known.
+struct SessionOwnerOf {
+  std::string session;
+  std::string address;
+};
+SessionOwnerOf OwnerOf(const absl::Status& status);
 
 // The status of a call that ended with `status`: with ErrorInfo, BadRequest where there is a field, and RetryInfo where
 // the call may be repeated. To be called where a status leaves the server, nowhere else.

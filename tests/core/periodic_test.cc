@@ -292,9 +292,15 @@ TEST_F(PeriodicTest, AddedPointsGetImages) {
         const auto vertex = (*mesher)->AddVertex((*vertices)[0], one);
         ASSERT_TRUE(vertex.ok()) << vertex.status();
         points.insert(points.end(), added.begin(), added.end());
+        points.insert(points.end(), one.begin(), one.end());
         ASSERT_EQ((*mesher)->Refine(parameters, context), absl::OkStatus());
         ASSERT_EQ((*mesher)->Update(*mesh, 1, context), absl::OkStatus());
         EXPECT_EQ(Check(*mesh, parameters, {}), absl::OkStatus());
+        for (size_t i = 0; i < points.size() / dimension; ++i) {
+          for (int k = 0; k < dimension; ++k) {
+            ASSERT_EQ(mesh->points[size_t{mesh->input_vertex[i]} * dimension + k], points[i * dimension + k]);
+          }
+        }
         for (size_t i = 0; i < vertices->size(); ++i) {
           for (int k = 0; k < dimension; ++k) {
             EXPECT_EQ(mesh->points[(*vertices)[i] * dimension + k], added[i * dimension + k]);

@@ -204,8 +204,13 @@ class MshWriter : public MeshWriter {
     for (const int axis : shape_.periodic_axes) {
       WELLSPACE_ASSIGN_OR_RETURN(const std::vector<VertexPair> pairs, pairs_.Across(axis));
       const int32_t low = 2 * axis + 1;
-      if (!groups_.part_entities().contains(low) || !groups_.part_entities().contains(low + 1)) {
-        return absl::InternalError(absl::StrCat("a mesh has no boundary across axis ", axis, ", which is periodic"));
+      if (!IsSide(low, axis, "min") || !IsSide(low + 1, axis, "max")) {
+        // Of a mesh from elsewhere tags may stand for anything.
+        const char letter = "xyz"[axis];
+        return absl::InvalidArgumentError(
+            absl::StrCat("periodic axis ", std::string(1, letter), ": expected sides of the boundary with the tags ",
+                         low, " and ", low + 1, " and the names ", std::string(1, letter), "min and ",
+                         std::string(1, letter), "max, as wellspace has them; convert to .npz, or without --periodic"));
       }
       AppendLink({.axis = axis,
                   .entity = groups_.part_entities().at(low + 1),
@@ -222,6 +227,14 @@ class MshWriter : public MeshWriter {
     output_.Write(row_);
     EndSection("$EndPeriodic");
     return output_.status();
+  }
+
+  // Whether the part with this tag is the side of a box at an end of an axis.
+  bool IsSide(int32_t tag, int axis, const char* end) const {
+    const std::string name = absl::StrCat(std::string(1, "xyz"[axis]), end);
+    return groups_.part_entities().contains(tag) &&
+           std::any_of(shape_.boundary.begin(), shape_.boundary.end(),
+                       [&](const BoundaryPart& part) { return part.tag == tag && part.name == name; });
   }
 
   // One text, the name; one number, the time; four whole numbers: the step, numbers in a value, values, the partition.

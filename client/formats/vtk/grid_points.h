@@ -22,7 +22,7 @@ struct VtkExtent {
 
 // The most points that a file of so many bytes may have by its axes: a line of text can tell of 2^32. Data of so many
 // points take more bytes than that, but for constants that are compressed.
-constexpr uint64_t MostGridPoints(uint64_t file_bytes) { return (uint64_t{1} << 20) + 1024 * file_bytes; }
+constexpr uint64_t MostGridPoints(uint64_t file_bytes) { return (uint64_t{1} << 20) + 64 * file_bytes; }
 
 // The places of points at whole indices: index x spacing, turned, from the origin on.
 struct VtkImage {

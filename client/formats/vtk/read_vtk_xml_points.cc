@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <set>
 #include <string>
@@ -204,7 +205,7 @@ absl::StatusOr<std::vector<std::string>> PiecesOf(std::string_view document, con
                                                   const char* kind) {
   XmlScanner xml(document, name);
   std::vector<std::string> sources;
-  std::set<std::string> seen;
+  std::set<std::string> seen;  // in one spelling
   bool is_begun = false;
   for (XmlScanner::Piece piece = xml.Next(); piece != XmlScanner::Piece::kEnd; piece = xml.Next()) {
     if (piece == XmlScanner::Piece::kError) {
@@ -227,7 +228,7 @@ absl::StatusOr<std::vector<std::string>> PiecesOf(std::string_view document, con
       return xml.Error(absl::StrCat("expected as Source of <Piece> a file beside this one, or in a folder there, got ",
                                     Quote(source)));
     }
-    if (!seen.insert(source).second) {
+    if (!seen.insert(std::filesystem::path(source).lexically_normal()).second) {
       return xml.Error(absl::StrCat("expected each piece once, got another ", Quote(source)));
     }
     sources.push_back(source);
@@ -247,7 +248,7 @@ absl::Status ReadPieces(InputFile& file, const char* kind, const CloudOptions& o
     return absl::InvalidArgumentError(absl::StrCat(cloud.name, ": expected one <Piece> or more, got none"));
   }
   const size_t slash = cloud.name.find_last_of('/');
-  const std::string folder = slash == std::string::npos ? "" : cloud.name.substr(0, slash + 1);
+  const std::string folder = slash == std::string::npos ? "./" : cloud.name.substr(0, slash + 1);
   PointTable all;
   for (const std::string& source : sources) {
     WELLSPACE_ASSIGN_OR_RETURN(InputFile piece, InputFile::Open(folder + source));

@@ -228,9 +228,9 @@ absl::Status VtkLegacyReader::MakeGridPoints() {
     columns[1].push_back(y);
     columns[2].push_back(z);
   };
-  if (dataset_ == "STRUCTURED_POINTS") {
+  if (dataset_ == "STRUCTURED_POINTS" && *count > 0) {  // without points along one axis the others need no look
     grid_.image.ForEachPoint(grid_.extent, add);
-  } else {
+  } else if (dataset_ != "STRUCTURED_POINTS") {
     for (size_t axis = 0; axis < 3; ++axis) {
       if (grid_.axes[axis].size() != grid_.extent.PointsAlong(static_cast<int>(axis))) {
         return reader_.Error(absl::StrCat("expected ", grid_.extent.PointsAlong(static_cast<int>(axis)),

@@ -134,17 +134,18 @@ absl::Status TransferValuesCall::Submit() {
   (void)memory_.Resize(values_.bytes());  // no more than it was
   // std::function wants to be copied, values do not.
   const auto values = std::make_shared<NumberChunks>(std::exchange(values_, {}));
-  const uint64_t vertices = std::max(from_->record().vertices(), onto_->record().vertices());
+  const uint64_t simplices = std::max(from_->record().simplices(), onto_->record().simplices());
   WELLSPACE_ASSIGN_OR_RETURN(
       job_, environment().jobs.Submit(
                 {.tenant = caller().tenant,
-                 .is_small = vertices <= kMostSmallPoints && !is_conservative_,
+                 .is_small = IsSmallTransfer(simplices, components_) && !is_conservative_,
                  .held = std::move(memory_),
                  .work = [self = SharedAs<TransferValuesCall>(), values](Job& job) { self->Work(*values, job); }}));
   return absl::OkStatus();
 }
 
 void TransferValuesCall::Work(NumberChunks& values, Job& job) {
+  MemoryReservation memory;  // first: it is given back when the values are freed
   core::CarriedField carried;
   absl::Status status = RunGuarded([&] {
     const std::vector<double> numbers = values.Flatten(job.context());
@@ -155,7 +156,7 @@ void TransferValuesCall::Work(NumberChunks& values, Job& job) {
   if (absl::IsInvalidArgument(status)) {
     status = Invalid(std::string(status.message()), "values");
   }
-  MemoryReservation memory = job.TakeMemory(carried.values.size() * sizeof(double));
+  memory = job.TakeMemory(carried.values.size() * sizeof(double));
   job.TakeMemory(std::numeric_limits<uint64_t>::max()).Release();
   {
     std::lock_guard lock(mutex_);

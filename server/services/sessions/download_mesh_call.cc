@@ -71,14 +71,14 @@ absl::Status DownloadMeshCall::Find() {
     use_.emplace(std::move(session));
     return absl::OkStatus();
   }
-  // The client has it, or differences that lead to it, from now on: those of later meshes from it are of use.
-  session->deltas().NoteDownload(mesh_->revision());
   if (IsDelta()) {
     WELLSPACE_RETURN_IF_ERROR(FindDeltas(*session));
   }
   WELLSPACE_RETURN_IF_ERROR(CheckRevision(deltas_.empty() ? mesh_->revision() : deltas_[0]->revision()));
   WELLSPACE_RETURN_IF_ERROR(BeginPart());
   WELLSPACE_RETURN_IF_ERROR(CheckNextChunk());
+  // The client has it, or differences that lead to it, from now on: those of later meshes from it are of use.
+  session->deltas().NoteDownload(mesh_->revision());
   use_.emplace(std::move(session));
   return absl::OkStatus();
 }

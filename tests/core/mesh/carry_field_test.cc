@@ -414,5 +414,35 @@ TEST(CarryField, CancelsAndMemoryThatIsNotThereEndIt) {
   expect_all(limited, absl::StatusCode::kOk);
 }
 
+// Where each old simplex overlaps all new ones, the parts are far more than simplices: their memory is asked for as they
+// come, and given up after each round.
+TEST(CarryField, MemoryOfManyOverlapsIsAskedFor) {
+  constexpr size_t kPoints = 400;
+  const auto slabs = [](bool is_across) {
+    std::vector<double> points;
+    for (size_t i = 0; i < kPoints; ++i) {
+      const double along = (i + 0.5) / kPoints;
+      const double side = i % 2 == 0 ? 0.0 : 1.0;
+      points.insert(points.end(), {is_across ? along : side, is_across ? side : along});
+    }
+    MeshParameters parameters{.dimension = 2, .rho = 1e9};
+    parameters.domain_low = {0, 0};
+    parameters.domain_high = {1, 1};
+    RunContext context;
+    return MeshPoints(parameters, points, context).value();
+  };
+  const Mesh from = slabs(false);
+  const Mesh onto = slabs(true);
+  const std::vector<double> values(from.simplex_count(), 1);
+  test::LimitedLender lender(100'000'000);
+  RunContext context;
+  context.SetMemoryLender(&lender);
+  const CarryRun run{.context = context};
+  ASSERT_TRUE(CarryField(Carrying::kMeans, {.values = values}, ViewOf(from), ViewOf(onto), run).ok());
+  lender.limit = 200'000;
+  EXPECT_EQ(CarryField(Carrying::kMeans, {.values = values}, ViewOf(from), ViewOf(onto), run).status().code(),
+            absl::StatusCode::kResourceExhausted);
+}
+
 }  // namespace
 }  // namespace wellspace::core

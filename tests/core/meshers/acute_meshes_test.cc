@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <numbers>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -131,6 +132,14 @@ TEST_F(AcuteMeshesTest, HaveNoFlatTetrahedra) {
       turned.points[i + 2] = p[2] - 0.2 * p[1];
     }
     EXPECT_GE(least_angle(turned), 4) << degrees;
+  }
+  // Wherever the part is, and however large: coordinates are rounded relatively.
+  for (const auto& [scale, offset] : {std::pair(0x1p20, 0.0), {1e-3, 0.0}, {100.0, 5e6}, {1.0, 1e4}}) {
+    TestSurface moved = Wedge(45);
+    for (double& x : moved.points) {
+      x = scale * x + offset;
+    }
+    EXPECT_GE(least_angle(moved), 11.5) << scale << " " << offset;
   }
   EXPECT_GE(least_angle(test::AcuteTetrahedron(10)), 5);
   EXPECT_GE(least_angle(test::AcuteTetrahedron(40)), 5);

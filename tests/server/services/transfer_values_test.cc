@@ -240,6 +240,17 @@ TEST_P(TransferValuesTest, AMeshThatPointsWereLocatedInIsKept) {
   EXPECT_GT(second, first);
 }
 
+TEST_P(TransferValuesTest, AMeshOfWhichPartsWereDownloadedIsKept) {
+  const std::string name = CreateRefined();
+  v1::DownloadMeshRequest request;
+  request.set_name(name);
+  request.mutable_partition()->set_parts(2);
+  const class Download part = calls_->DownloadMesh(request);
+  ASSERT_TRUE(part.status.ok()) << part.status.error_message();
+  RefineFurther(name);
+  EXPECT_TRUE(Locate(name, part.metadata.at(0).revision()).ok());
+}
+
 TEST_P(TransferValuesTest, ErrorsNameTheirCause) {
   const std::string name = CreateRefined();
   const ClientMesh mesh = Download(name);

@@ -75,6 +75,30 @@ TEST_F(KeptProductsTest, ThoseOfAnotherMeshGoAndOfOneBeforeAreNotKept) {
   EXPECT_EQ(memory_.reserved(), 100u);
 }
 
+// The mesh is replaced while a product of it is made.
+TEST_F(KeptProductsTest, OfAMeshThatIsReplacedMeanwhileNoneIsKept) {
+  const auto made = products_.Prepare([] { return MeshOf(1); },
+                                      [&](const MeshSnapshot& mesh) {
+                                        EXPECT_TRUE(products_.Drop().empty());
+                                        return Make(mesh, 1);
+                                      });
+  EXPECT_EQ((*made)->revision, 1u);
+  EXPECT_FALSE(Has(1, 1));
+  Prepare(2, 1);
+  EXPECT_TRUE(Has(2, 1));
+}
+
+TEST_F(KeptProductsTest, AreHandedOver) {
+  const Made first = Prepare(1, 1);
+  KeptProducts<Product> earlier(2);
+  EXPECT_TRUE(earlier.Replace(products_.Drop()).empty());
+  EXPECT_EQ(earlier.Find(1), first);
+  EXPECT_FALSE(Has(1, 1));
+  EXPECT_TRUE(products_.WasAskedFor(1));
+  Prepare(2, 1);
+  EXPECT_TRUE(products_.WasAskedFor(2) && !products_.WasAskedFor(1));
+}
+
 TEST_F(KeptProductsTest, WhatIsInUseIsNotSpare) {
   const Made in_use = Prepare(1, 1);
   Prepare(1, 2);
