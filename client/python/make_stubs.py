@@ -76,6 +76,15 @@ class Package:
                 if isinstance(one, ast.AnnAssign):
                     yield self.home[name], one
 
+    def methods_of(self, module: Module, of_class: str, name: str) -> tuple[Module, list[Function]]:
+        """The methods `name` of a class, or else of a base of it, and the module that has them."""
+        node = module.classes[of_class]
+        found = [one for one in node.body if isinstance(one, _FUNCTIONS) and one.name == name]
+        for base in (_name(one) for one in node.bases if not found):
+            if not found and base in self.home:
+                module, found = self.methods_of(self.home[base], base, name)
+        return module, found
+
     def description_of(self, kind: str) -> str:
         """The docstrings of a TypedDict and of its bases, which describe its keys."""
         documents = (ast.get_docstring(self.home[name].classes[name]) for name in self.kinds_of(kind))
@@ -165,9 +174,8 @@ class Stub:
 
     def _stubs_of_models(self, node: Function, of_class: str) -> list[Function]:
         """A method that hands ``**options`` on has the arguments of the one of `Session` that it awaits."""
-        module = self._package.modules["_sessions"]
         name = "__init__" if node.name == "create" else node.name
-        models = [one for one in module.classes[of_class].body if isinstance(one, _FUNCTIONS) and one.name == name]
+        module, models = self._package.methods_of(self._package.modules["_sessions"], of_class, name)
         found = []
         for model in Stub(self._package, module.name)._functions(models, of_class):
             made = copy.deepcopy(node)

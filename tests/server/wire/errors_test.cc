@@ -66,9 +66,13 @@ TEST(ToGrpcStatus, SendsReasonFieldAndRetry) {
 }
 
 TEST(ToGrpcStatus, SaysWhereASessionIs) {
-  EXPECT_EQ(DetailsOf(SessionElsewhereError("x", "host:1")).address, "host:1");
-  EXPECT_EQ(DetailsOf(SessionElsewhereError("x", "")).address, "");
-  EXPECT_TRUE(DetailsOf(SessionElsewhereError("x", "host:1")).may_retry);
+  EXPECT_EQ(DetailsOf(SessionElsewhereError("x", "0123", "host:1")).address, "host:1");
+  EXPECT_EQ(DetailsOf(SessionElsewhereError("x", "0123", "")).address, "");
+  EXPECT_TRUE(DetailsOf(SessionElsewhereError("x", "0123", "host:1")).may_retry);
+  const SessionOwnerOf owner = OwnerOf(SessionElsewhereError("x", "0123", "host:1"));
+  EXPECT_EQ(owner.session, "0123");
+  EXPECT_EQ(owner.address, "host:1");
+  EXPECT_EQ(OwnerOf(SessionElsewhereError("x", "0123", "")).session, "");
 }
 
 TEST(ToGrpcStatus, RepeatsMemoryLimitsOnlyWhereItHelps) {
