@@ -9,6 +9,7 @@
 
 #include "core/base/cancellable_sort.h"
 #include "core/base/dimensions.h"
+#include "core/base/check_at.h"
 #include "core/base/status_macros.h"
 #include "core/simplex/determinant.h"
 #include "core/simplex/nearest_place.h"
@@ -143,12 +144,9 @@ absl::StatusOr<Locator<D>> Locator<D>::Create(std::span<const double> points, st
     return locator;
   }
   locator.all_ = BoxAround<D>(locator.CornersOf(0));
-  for (size_t i = 0; i < points.size(); i += D) {
-    if (i % kStepsBetweenChecks < D) {
-      WELLSPACE_RETURN_IF_ERROR(context.Check());
-    }
-    Point<D> p;
-    std::copy_n(&points[i], D, p.begin());
+  for (size_t v = 0; v < points.size() / D; ++v) {
+    WELLSPACE_RETURN_IF_ERROR(CheckAt(v, context));
+    const Point<D> p = PointAt<D>(points, v);
     locator.all_.Include(Box<D>{p, p});
   }
   for (int i = 0; i < D; ++i) {
