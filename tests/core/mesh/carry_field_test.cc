@@ -414,8 +414,8 @@ TEST(CarryField, CancelsAndMemoryThatIsNotThereEndIt) {
   expect_all(limited, absl::StatusCode::kOk);
 }
 
-// Where each old simplex overlaps all new ones, the parts are far more than simplices: their memory is asked for as they
-// come, and given up after each round.
+// Where each old simplex overlaps all new ones, the parts are far more than simplices: their memory is asked for as
+// they come, and given up after each round.
 TEST(CarryField, MemoryOfManyOverlapsIsAskedFor) {
   constexpr size_t kPoints = 400;
   const auto slabs = [](bool is_across) {
