@@ -52,8 +52,8 @@ absl::Status SpaceMesher::MakeTetrahedra(int threads, RunContext& context) {
   if (has_changed) {
     WELLSPACE_ASSIGN_OR_RETURN(points, ScaledPoints(context));
   }
-  // Around acute creases vertices mirror each other, and do not move. Of membranes the labels know nothing: an edge could
-  // come to pierce one.
+  // Around acute creases vertices mirror each other, and do not move. Of membranes the labels know nothing: an edge
+  // could come to pierce one.
   if (!spatial_->creases().IsEmpty() && spatial_->solids().membranes == 0) {
     WELLSPACE_RETURN_IF_ERROR(FlipFlatTetrahedra(points, simplices.indices, solids, context).status());
   }
