@@ -20,7 +20,7 @@ from ._parameters import Parameters, fill, naming, split, takes
 from ._part import MeshPart, partition_of
 from ._plane import PlaneArguments, make_plane
 from ._progress import ProgressOption, told
-from ._queries import add_vertices
+from ._queries import add_vertices, hints_of
 from ._retry import Attempt, CancelToken
 from ._session_info import SessionInfo, info_of_session, set_ttl
 from ._session_queries import SessionQueries
