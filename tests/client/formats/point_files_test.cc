@@ -429,8 +429,9 @@ TEST_F(PointFilesTest, VtkErrors) {
   };
   EXPECT_EQ(ReadBad("a.vtk", "vtk\n"), "a.vtk:1: expected \"# vtk DataFile Version\" at the start of the file");
   EXPECT_EQ(message("ASCII", "TEXT"), "a.vtk:3: expected \"ASCII\" or \"BINARY\", got \"TEXT\"");
-  EXPECT_EQ(message("POLYDATA", "RECTILINEAR_GRID"),
-            "a.vtk:4: expected DATASET POLYDATA, UNSTRUCTURED_GRID or STRUCTURED_GRID, got \"RECTILINEAR_GRID\"");
+  EXPECT_EQ(message("POLYDATA", "TABLE"),
+            "a.vtk:4: expected DATASET POLYDATA, UNSTRUCTURED_GRID, STRUCTURED_GRID, STRUCTURED_POINTS or "
+            "RECTILINEAR_GRID, got \"TABLE\"");
   EXPECT_THAT(message("3 float", "3 half"), HasSubstr("a.vtk:5: expected a type of numbers"));
   EXPECT_THAT(message("POINTS 3", "POINTS 5000000000"), HasSubstr("a.vtk:5: expected a whole number of at most"));
   EXPECT_EQ(message("9.5\n", "nine\n"), "a.vtk:8: expected a number, got \"nine\"");
