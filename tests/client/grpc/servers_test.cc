@@ -87,6 +87,8 @@ Answer Right(const Heard& heard) {
   *ended.mutable_operation() = operation.operation();
   v1::LocateResponse located;
   located.set_revision(5);
+  v1::TransferValuesResponse transferred;
+  transferred.mutable_start()->set_revision(5);
   // Answers of one operation or one session have it in field 1, all of them.
   const std::map<std::string, std::vector<std::string>> messages = {
       {"GetSession", {session.SerializeAsString()}},
@@ -98,6 +100,7 @@ Answer Right(const Heard& heard) {
       {"CancelOperation", {operation.SerializeAsString()}},
       {"WatchOperation", {ended.SerializeAsString()}},
       {"Locate", {located.SerializeAsString()}},
+      {"TransferValues", {transferred.SerializeAsString()}},
       {"ApproximateNearestNeighbors", {}},
       {"ClippedVoronoiCells", {}},
       {"VoronoiCells", {}},
@@ -166,6 +169,9 @@ std::vector<AnyCall> CallsOnASession() {
         return client.VoronoiCells(kSession, {}, [](const CellBatch&) { return absl::OkStatus(); });
       },
       [](Client& client) { return client.Locate(kSession, {}).status(); },
+      [](Client& client) {
+        return client.TransferValues(kSession, std::vector<double>{1}, {.from_revision = 1}).status();
+      },
       [](Client& client) { return client.AddVertices(kSession, {}).status(); },
       [](Client& client) { return client.DeleteSession(kSession); },
   };
