@@ -61,11 +61,11 @@ TEST_F(SessionCommandsTest, GoToTheServerThatHasTheSession) {
   const RunResult shown = Run({"session", "show", kSession});
   EXPECT_EQ(shown.exit_code, 0) << shown.err;
   EXPECT_THAT(shown.out, HasSubstr(kSession));
-  const RunResult stayed = Run({"session", "show", kSession, "--no-follow", "--timeout", "0.5"});
+  const RunResult stayed = Run({"session", "show", kSession, "--no-follow", "--timeout", "2"});
   EXPECT_NE(stayed.exit_code, 0);
   EXPECT_THAT(stayed.err, HasSubstr("the session is elsewhere"));
   const RunResult told =
-      RunWellspace({"session", "show", kSession, "--timeout", "0.5"},
+      RunWellspace({"session", "show", kSession, "--timeout", "2"},
                    {.input = "", .environment = {"WELLSPACE_SERVER=" + server_.address(), "WELLSPACE_NO_FOLLOW=1"}});
   EXPECT_NE(told.exit_code, 0);
   EXPECT_THAT(told.err, HasSubstr("the session is elsewhere"));
