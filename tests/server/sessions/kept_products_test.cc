@@ -32,7 +32,9 @@ class KeptProductsTest : public ::testing::Test {
         .value();
   }
   static absl::StatusOr<std::shared_ptr<const MeshSnapshot>> MeshOf(uint64_t revision) {
-    return std::make_shared<MemoryMesh>(revision, core::Mesh());
+    core::Mesh mesh;
+    mesh.dimension = 2;
+    return std::make_shared<MemoryMesh>(revision, std::move(mesh));
   }
   absl::StatusOr<Made> Make(const MeshSnapshot& mesh, int kind) {
     ++made_;
