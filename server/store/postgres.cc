@@ -48,6 +48,13 @@ bool IsInTheWay(const std::exception& error) {
          dynamic_cast<const pqxx::unique_violation*>(&error) != nullptr;
 }
 
+// Whether the connection has gone. A transaction that reads is in doubt to libpqxx, too, if it goes during the commit.
+bool IsGone(const std::exception& error) {
+  return dynamic_cast<const pqxx::broken_connection*>(&error) != nullptr ||
+         dynamic_cast<const pqxx::in_doubt_error*>(&error) != nullptr ||
+         dynamic_cast<const pqxx::statement_completion_unknown*>(&error) != nullptr;
+}
+
 std::string Saying(std::string_view what, const std::string& said) {
   return absl::StrCat(std::string(what), std::string(kDatabaseSays), said);
 }
@@ -56,7 +63,7 @@ std::string Saying(std::string_view what, const std::string& said) {
 
 absl::Status ErrorOfPostgres(const std::exception& exception) {
   const std::string text = absl::StrReplaceAll(absl::StripAsciiWhitespace(exception.what()), {{"\n", " "}, {"\t", ""}});
-  if (dynamic_cast<const pqxx::broken_connection*>(&exception) != nullptr) {
+  if (IsGone(exception)) {
     return MakeError(v1::ERROR_REASON_STORE_FAILED, Saying("there is no connection to the database", text));
   }
   if (dynamic_cast<const std::bad_alloc*>(&exception) != nullptr) {
@@ -126,7 +133,7 @@ absl::Status PostgresLink::Run(Kind kind, const Work& work) {
                                  : RunOnce<pqxx::work>(work, &transaction_id, &is_in_doubt);
     } catch (const std::exception& error) {
       const absl::Status status = ErrorOfPostgres(error);
-      const bool is_gone = dynamic_cast<const pqxx::broken_connection*>(&error) != nullptr;
+      const bool is_gone = IsGone(error);
       // One that is being shut down says so before it goes.
       if (is_in_doubt || absl::IsUnavailable(status) || dynamic_cast<const pqxx::sql_error*>(&error) == nullptr) {
         connection_ = nullptr;

@@ -266,6 +266,23 @@ TEST_F(PostgresRecordsTest, ACommitInDoubtIsLookedUp) {
   EXPECT_EQ(failures_, 0);
 }
 
+// To the library of PostgreSQL, the end of a transaction that only reads is in doubt, too; here it is read again.
+TEST_F(PostgresRecordsTest, AReadThatLosesItsConnectionAtItsEndIsMadeAgain) {
+  CuttingProxy proxy(server_->port());
+  address_ = absl::StrCat("postgresql://tester@127.0.0.1:", proxy.port(), "/", database_);
+  const auto records = Open("first", absl::Hours(1)).value();
+  ASSERT_TRUE(Create(*records, 1).ok());
+  ASSERT_TRUE(Update(*records, 1, records->epoch(), 2).ok());
+  ASSERT_TRUE(records->ReadRecord(SessionName(1)).ok()) << "it is connected";
+  for (const CuttingProxy::Cut cut : {CuttingProxy::Cut::kAfterCommit, CuttingProxy::Cut::kBeforeCommit}) {
+    proxy.CutNext(cut);
+    const auto record = records->ReadRecord(SessionName(1));
+    ASSERT_TRUE(record.ok()) << record.status();
+    EXPECT_EQ((*record)->revision(), 2u);
+  }
+  EXPECT_EQ(failures_, 0);
+}
+
 // Where that cannot be found out the server ends, and the next one sees what there is.
 TEST_F(PostgresRecordsTest, ACommitWhoseOutcomeCannotBeFoundOutIsAFailure) {
   const std::string direct = address_;
