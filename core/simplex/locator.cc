@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "core/base/cancellable_sort.h"
-#include "core/base/dimensions.h"
 #include "core/base/check_at.h"
+#include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
 #include "core/simplex/determinant.h"
 #include "core/simplex/nearest_place.h"
