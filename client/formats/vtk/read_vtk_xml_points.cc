@@ -236,6 +236,18 @@ absl::StatusOr<std::vector<std::string>> PiecesOf(std::string_view document, con
   return sources;
 }
 
+// The piece of file `name` at `folder` and `source`. An error names the file, and `source` in printable characters.
+absl::StatusOr<InputFile> OpenPiece(const std::string& name, const std::string& folder, const std::string& source) {
+  const std::string path = folder + source;
+  absl::StatusOr<InputFile> piece = InputFile::Open(path);
+  if (!piece.ok()) {
+    std::string reason(piece.status().message());
+    reason.erase(0, reason.find(path) + path.size());
+    return absl::Status(piece.status().code(), absl::StrCat(name, ": cannot open the piece ", Quote(source), reason));
+  }
+  return piece;
+}
+
 // The points of all pieces. Those that pieces have in common come as often; the mesher merges them.
 absl::Status ReadPieces(InputFile& file, const char* kind, const CloudOptions& options, PointCloud& cloud) {
   if (cloud.name == "<stdin>") {
@@ -251,7 +263,7 @@ absl::Status ReadPieces(InputFile& file, const char* kind, const CloudOptions& o
   const std::string folder = slash == std::string::npos ? "./" : cloud.name.substr(0, slash + 1);
   PointTable all;
   for (const std::string& source : sources) {
-    WELLSPACE_ASSIGN_OR_RETURN(InputFile piece, InputFile::Open(folder + source));
+    WELLSPACE_ASSIGN_OR_RETURN(InputFile piece, OpenPiece(cloud.name, folder, source));
     WELLSPACE_ASSIGN_OR_RETURN(PointTable table, ReadTable(piece, kind, options));
     if (table.columns[0].empty()) {
       continue;  // of a rank without points, and often without names of data

@@ -120,6 +120,10 @@ TEST_F(VtkGridsTest, PiecesLieBesideTheirFile) {
   EXPECT_EQ(Read("a.pvti", Changed(pieces, "b_1.vti", "-")).status().code(), absl::StatusCode::kNotFound);
   EXPECT_THAT(ReadBad("a.pvtu", pieces), HasSubstr("expected <VTKFile type=\"PUnstructuredGrid\" ...>"));
   EXPECT_EQ(Read("a.pvti", Changed(pieces, "b_1.vti", "c.vti")).status().code(), absl::StatusCode::kNotFound);
+  EXPECT_THAT(std::string(Read("a.pvti", Changed(pieces, "b_1.vti", "c\n\xff")).status().message()),
+              HasSubstr("a.pvti: cannot open the piece \"c\\n\\xff\": No such file"));
+  EXPECT_THAT(ReadBad("a.pvti", Changed(pieces, "b_1.vti", ".")),
+              HasSubstr("cannot open the piece \".\": it is a folder"));
   folder_.Write("b_1.vti", Changed(kImage, "Name=\"h\"", "Name=\"k\""));
   EXPECT_THAT(ReadBad("a.pvti", pieces, kWithAttributes),
               HasSubstr("b_1.vti: expected data of points as in the pieces before, \"x y z h\", got \"x y z k\""));
