@@ -3,6 +3,7 @@
 #include <numeric>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/check_at.h"
 #include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
 #include "core/geometry/point.h"
@@ -30,9 +31,7 @@ absl::StatusOr<PointsWithImages> WithImages(const PeriodicBox<D>& box, std::span
   }
   std::vector<double> images;
   for (uint32_t i = 0; i < points.size() / D; ++i) {
-    if (i % kStepsBetweenChecks == 0) {
-      WELLSPACE_RETURN_IF_ERROR(context.Check());
-    }
+    WELLSPACE_RETURN_IF_ERROR(CheckAt(i, context));
     box.ForEachImage(PointAt<D>(points, i), [&](const Point<D>& image) {
       images.insert(images.end(), image.begin(), image.end());
       result.sources.push_back(i);

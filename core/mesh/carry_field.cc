@@ -9,9 +9,11 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/check_at.h"
 #include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
+#include "core/geometry/largest_coordinate.h"
 #include "core/mesh/carry_means.h"
 #include "core/mesh/kept_parts.h"
 #include "core/mesh/view_rows.h"
@@ -25,14 +27,6 @@ constexpr size_t kPlacesBetweenChecks = size_t{1} << 8;
 
 // A place is outside of a mesh if it is farther from it than this part of its largest coordinate; less is rounding.
 constexpr double kRounding = 0x1p-40;
-
-double LargestOf(std::span<const double> points) {
-  double largest = 0;
-  for (const double x : points) {
-    largest = std::max(largest, std::abs(x));
-  }
-  return largest;
-}
 
 // The sum of rows of `values` by the weights of their simplex's corners. It is no less than the least of them, and no
 // more than the largest: rounding makes no extremes.
@@ -90,7 +84,7 @@ class PlaceTransfer {
   const CarryRun& run_;
 
   double rounding_ = 0;
-  HugeVector<uint32_t> twins_;   // of the new simplices
+  Twins twins_;
   std::vector<uint32_t> rows_;   // that are not copied
   std::vector<double> places_;   // of these: rows x D
   std::vector<uint32_t> order_;  // of the places, along a curve
@@ -103,7 +97,7 @@ uint64_t PlaceTransfer<D>::Bytes() const {
   // Vectors grow by doubling; the order along the curve is made beside the places.
   const uint64_t of_row = field_.components * sizeof(double) + 2 * (sizeof(uint32_t) + D * sizeof(double)) + 36;
   return rows() * of_row + TwinBytes(from_count(), onto_.simplices.size() / (D + 1), onto_.points.size() / D) +
-         from_count() / 8 + ChangedSimplices<D>::BytesFor(from_count(), from_.points.size() / D);
+         ChangedSimplices<D>::BytesFor(from_count(), from_.points.size() / D);
 }
 
 template <int D>
@@ -113,18 +107,13 @@ absl::StatusOr<CarriedField> PlaceTransfer<D>::Run() {
   if (rows_.empty()) {
     return std::move(carried_);
   }
-  rounding_ = kRounding * LargestOf(from_.points);
-  std::vector<bool> has_twin(from_count(), false);
-  for (const uint32_t twin : twins_) {
-    if (twin != kNoSimplex) {
-      has_twin[twin] = true;
-    }
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(const double largest, LargestCoordinate(from_.points, run_.context));
+  rounding_ = kRounding * largest;
   bool is_outside = false;
   {
     ChangedSimplices<D> changed;
     WELLSPACE_RETURN_IF_ERROR(changed.Find(
-        from_, [&](size_t i) { return !has_twin[i]; }, run_.context));
+        from_, [&](size_t i) { return !twins_.has_twin[i]; }, run_.context));
     WELLSPACE_ASSIGN_OR_RETURN(order_, changed.locator.CurveOrder(places_, run_.context));
     const bool are_all = changed.numbers.size() == from_count();
     WELLSPACE_ASSIGN_OR_RETURN(is_outside, LocateAll(changed.locator, changed.numbers, are_all));
@@ -144,9 +133,7 @@ template <int D>
 absl::Status PlaceTransfer<D>::CopyKept() {
   WELLSPACE_RETURN_IF_ERROR(Fill(carried_.values, rows() * field_.components, 0, run_.context));
   for (size_t row = 0; is_linear_ && row < rows(); ++row) {
-    if (row % kStepsBetweenChecks == 0) {
-      WELLSPACE_RETURN_IF_ERROR(run_.context.Check());
-    }
+    WELLSPACE_RETURN_IF_ERROR(CheckAt(row, run_.context));
     if (IsKept<D>(from_.points, onto_.points, row)) {
       CopyRow(field_, row, row, &carried_.values);
     } else {
@@ -159,11 +146,9 @@ absl::Status PlaceTransfer<D>::CopyKept() {
   }
   WELLSPACE_ASSIGN_OR_RETURN(twins_, TwinSearch<D>(from_, onto_, run_.context).Run());
   for (size_t row = 0; !is_linear_ && row < rows(); ++row) {
-    if (row % kStepsBetweenChecks == 0) {
-      WELLSPACE_RETURN_IF_ERROR(run_.context.Check());
-    }
-    if (twins_[row] != kNoSimplex) {
-      CopyRow(field_, twins_[row], row, &carried_.values);
+    WELLSPACE_RETURN_IF_ERROR(CheckAt(row, run_.context));
+    if (twins_.of_onto[row] != kNoSimplex) {
+      CopyRow(field_, twins_.of_onto[row], row, &carried_.values);
     } else {
       rows_.push_back(static_cast<uint32_t>(row));
       const Point<D> centroid = CentroidOf<D>(CornersOf<D>(onto_, row));
@@ -227,9 +212,7 @@ absl::Status CheckField(const Field& field, size_t count, const char* of, const 
                                                    field.components, " for each of the ", count, " ", of));
   }
   for (size_t i = 0; i < field.values.size(); ++i) {
-    if (i % kStepsBetweenChecks == 0) {
-      WELLSPACE_RETURN_IF_ERROR(context.Check());
-    }
+    WELLSPACE_RETURN_IF_ERROR(CheckAt(i, context));
     if (!std::isfinite(field.values[i])) {
       return absl::InvalidArgumentError(absl::StrCat("values[", i / field.components, "]: component ",
                                                      i % field.components, " is ", field.values[i],

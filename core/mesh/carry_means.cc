@@ -7,8 +7,10 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/check_at.h"
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
+#include "core/geometry/largest_coordinate.h"
 #include "core/mesh/kept_parts.h"
 #include "core/mesh/view_rows.h"
 #include "core/simplex/determinant.h"
@@ -85,8 +87,7 @@ class MeanTransfer {
   const CarryRun& run_;
 
   double scale_ = 1;
-  HugeVector<uint32_t> twins_;       // of the new simplices
-  std::vector<bool> has_twin_;       // of the old simplices
+  Twins twins_;
   ChangedSimplices<D> changed_;      // of the new simplices
   HugeVector<double> volumes_;       // of the new simplices
   HugeVector<double> covered_;       // of the new simplices: the volume that old ones have
@@ -98,8 +99,7 @@ class MeanTransfer {
 template <int D>
 uint64_t MeanTransfer<D>::Bytes() const {
   const uint64_t onto = onto_count();
-  return TwinBytes(from_count(), onto, onto_.points.size() / D) + from_count() / 8 +
-         onto * sizeof(double) * (2 + 4 * field_.components) +
+  return TwinBytes(from_count(), onto, onto_.points.size() / D) + onto * sizeof(double) * (2 + 4 * field_.components) +
          // Of a round, mostly. Where old simplices overlap many new ones, AllowParts asks for more.
          2 * onto * sizeof(Part) + ChangedSimplices<D>::BytesFor(onto, onto_.points.size() / D);
 }
@@ -114,27 +114,14 @@ double MeanTransfer<D>::VolumeOf(const Simplex<D>& corners) const {
 template <int D>
 absl::Status MeanTransfer<D>::Prepare() {
   WELLSPACE_ASSIGN_OR_RETURN(twins_, TwinSearch<D>(from_, onto_, run_.context).Run());
-  has_twin_.assign(from_count(), false);
-  for (const uint32_t twin : twins_) {
-    if (twin != kNoSimplex) {
-      has_twin_[twin] = true;
-    }
-  }
-  double largest = 0;
-  for (const MeshView& mesh : {from_, onto_}) {
-    WELLSPACE_RETURN_IF_ERROR(run_.context.Check());
-    for (const double x : mesh.points) {
-      largest = std::max(largest, std::abs(x));
-    }
-  }
-  scale_ = ScaleOf(largest);
+  WELLSPACE_ASSIGN_OR_RETURN(const double largest_before, LargestCoordinate(from_.points, run_.context));
+  WELLSPACE_ASSIGN_OR_RETURN(const double largest, LargestCoordinate(onto_.points, run_.context));
+  scale_ = ScaleOf(std::max(largest_before, largest));
   WELLSPACE_RETURN_IF_ERROR(changed_.Find(
-      onto_, [&](size_t t) { return twins_[t] == kNoSimplex; }, run_.context));
+      onto_, [&](size_t t) { return twins_.of_onto[t] == kNoSimplex; }, run_.context));
   volumes_.resize(onto_count());
   for (size_t t = 0; t < onto_count(); ++t) {
-    if (t % kStepsBetweenChecks == 0) {
-      WELLSPACE_RETURN_IF_ERROR(run_.context.Check());
-    }
+    WELLSPACE_RETURN_IF_ERROR(CheckAt(t, run_.context));
     volumes_[t] = VolumeOf(CornersOf<D>(onto_, t));
   }
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -187,7 +174,7 @@ absl::Status MeanTransfer<D>::FillBlock(size_t begin, size_t end, PartsOfBlock* 
     if (s % kSimplicesBetweenChecks == 0) {
       WELLSPACE_RETURN_IF_ERROR(run_.context.Check());
     }
-    if (!has_twin_[s]) {
+    if (!twins_.has_twin[s]) {
       WELLSPACE_RETURN_IF_ERROR(FindParts(s, &block->parts));
     }
     block->ends.push_back(block->parts.size());
@@ -262,10 +249,8 @@ absl::StatusOr<CarriedField> MeanTransfer<D>::Finish() {
   WELLSPACE_RETURN_IF_ERROR(Fill(carried.values, masses_.size(), 0, run_.context));
   std::vector<uint32_t> outside;
   for (size_t t = 0; t < onto_count(); ++t) {
-    if (t % kStepsBetweenChecks == 0) {
-      WELLSPACE_RETURN_IF_ERROR(run_.context.Check());
-    }
-    const bool has_twin = twins_[t] != kNoSimplex;
+    WELLSPACE_RETURN_IF_ERROR(CheckAt(t, run_.context));
+    const bool has_twin = twins_.of_onto[t] != kNoSimplex;
     if (!has_twin && !(covered_[t] > 0)) {
       outside.push_back(static_cast<uint32_t>(t));
       continue;
@@ -274,8 +259,9 @@ absl::StatusOr<CarriedField> MeanTransfer<D>::Finish() {
     const bool is_covered = volumes_[t] > 0 && covered_[t] >= (1 - kUncovered) * volumes_[t];
     const double divisor = is_covered ? volumes_[t] : covered_[t];
     for (size_t at = t * field_.components; at < (t + 1) * field_.components; ++at) {
-      carried.values[at] = has_twin ? field_.values[twins_[t] * field_.components + (at - t * field_.components)]
-                                    : std::clamp(masses_[at] / divisor, low_[at], high_[at]);
+      carried.values[at] = has_twin
+                               ? field_.values[twins_.of_onto[t] * field_.components + (at - t * field_.components)]
+                               : std::clamp(masses_[at] / divisor, low_[at], high_[at]);
     }
   }
   carried.outside_count = outside.size();

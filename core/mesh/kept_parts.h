@@ -12,6 +12,7 @@
 
 #include "absl/status/statusor.h"
 #include "core/base/cancellable_sort.h"
+#include "core/base/check_at.h"
 #include "core/base/memory/huge_pages.h"
 #include "core/base/run_context.h"
 #include "core/base/status_macros.h"
@@ -27,22 +28,28 @@ bool IsKept(std::span<const double> from, std::span<const double> onto, size_t v
   return end <= from.size() && end <= onto.size() && std::memcmp(&from[v * D], &onto[v * D], D * sizeof(double)) == 0;
 }
 
-// Finds the simplices that two meshes have in common.
+// The simplices that two meshes have in common.
+struct Twins {
+  HugeVector<uint32_t> of_onto;  // for each simplex of `onto` that of `from`; kNoSimplex: it has none
+  std::vector<bool> has_twin;    // by simplex of `from`
+};
+
+// Finds them.
 template <int D>
 class TwinSearch {
  public:
   TwinSearch(const MeshView& from, const MeshView& onto, const RunContext& context)
       : from_(from), onto_(onto), context_(context) {}
 
-  // For each simplex of `onto` the one of `from` that has the same vertices, all of them kept; kNoSimplex for others.
+  // Twins have the same vertices, all of them kept.
   //
   // Complexity: O(n log k) for vertices of at most k simplices.
   // Errors:     CANCELLED, DEADLINE_EXCEEDED.
-  absl::StatusOr<HugeVector<uint32_t>> Run() {
+  absl::StatusOr<Twins> Run() {
     WELLSPACE_RETURN_IF_ERROR(FindKept());
     WELLSPACE_RETURN_IF_ERROR(MatchInOrder());
     WELLSPACE_RETURN_IF_ERROR(MatchOthers());
-    return std::move(twins_);
+    return Twins{.of_onto = std::move(twins_), .has_twin = std::move(has_twin_)};
   }
 
  private:
@@ -62,7 +69,6 @@ class TwinSearch {
     return std::ranges::all_of(corners, [&](uint32_t v) { return v < is_kept_.size() && is_kept_[v] != 0; });
   }
   size_t from_count() const { return from_.simplices.size() / (D + 1); }
-  absl::Status CheckAt(size_t i) const { return i % kStepsBetweenChecks == 0 ? context_.Check() : absl::OkStatus(); }
 
   absl::Status FindKept();
   // A mesh that was updated has the simplices that it keeps in their order, with those that are gone left out.
@@ -76,8 +82,8 @@ class TwinSearch {
   const MeshView& onto_;
   const RunContext& context_;
   HugeVector<uint8_t> is_kept_;     // of the vertices of both
-  HugeVector<uint32_t> twins_;      // the result
-  std::vector<bool> is_matched_;    // of `from`
+  HugeVector<uint32_t> twins_;      // Twins::of_onto
+  std::vector<bool> has_twin_;      // Twins::has_twin
   HugeVector<uint32_t> by_vertex_;  // simplices of `from` that are not matched, by their lowest vertex
   HugeVector<uint32_t> ends_;       // of each vertex in by_vertex_
 };
@@ -86,7 +92,7 @@ template <int D>
 absl::Status TwinSearch<D>::FindKept() {
   is_kept_.resize(std::min(from_.points.size(), onto_.points.size()) / D);
   for (size_t v = 0; v < is_kept_.size(); ++v) {
-    WELLSPACE_RETURN_IF_ERROR(CheckAt(v));
+    WELLSPACE_RETURN_IF_ERROR(CheckAt(v, context_));
     is_kept_[v] = IsKept<D>(from_.points, onto_.points, v) ? 1 : 0;
   }
   return absl::OkStatus();
@@ -95,24 +101,24 @@ absl::Status TwinSearch<D>::FindKept() {
 template <int D>
 absl::Status TwinSearch<D>::MatchInOrder() {
   twins_.assign(onto_.simplices.size() / (D + 1), kNoSimplex);
-  is_matched_.assign(from_count(), false);
+  has_twin_.assign(from_count(), false);
   size_t next = 0;
   size_t steps = 0;  // over simplices that are gone: in meshes that were made anew there is no end of them
   for (size_t i = 0; i < twins_.size() && next < from_count() && steps <= 2 * from_count(); ++i) {
-    WELLSPACE_RETURN_IF_ERROR(CheckAt(i));
+    WELLSPACE_RETURN_IF_ERROR(CheckAt(i, context_));
     const Corners corners = RowOf(onto_, i);
     if (!AreKept(corners)) {
       continue;
     }
     size_t found = next;
     while (found < from_count() && steps <= 2 * from_count() && RowOf(from_, found) != corners) {
-      WELLSPACE_RETURN_IF_ERROR(CheckAt(steps));
+      WELLSPACE_RETURN_IF_ERROR(CheckAt(steps, context_));
       ++found;
       ++steps;
     }
     if (found < from_count() && RowOf(from_, found) == corners) {
       twins_[i] = static_cast<uint32_t>(found);
-      is_matched_[found] = true;
+      has_twin_[found] = true;
       next = found + 1;
     }
   }
@@ -125,8 +131,8 @@ absl::Status TwinSearch<D>::SortByVertex() {
   by_vertex_.resize(from_count());
   for (const bool is_counting : {true, false}) {
     for (size_t i = 0; i < from_count(); ++i) {
-      WELLSPACE_RETURN_IF_ERROR(CheckAt(i));
-      if (is_matched_[i] || !AreKept(RowOf(from_, i))) {
+      WELLSPACE_RETURN_IF_ERROR(CheckAt(i, context_));
+      if (has_twin_[i] || !AreKept(RowOf(from_, i))) {
         continue;
       }
       const uint32_t lowest = SortedRowOf(from_, i)[0];
@@ -172,7 +178,7 @@ template <int D>
 absl::Status TwinSearch<D>::MatchOthers() {
   WELLSPACE_RETURN_IF_ERROR(SortByVertex());
   for (size_t i = 0; i < twins_.size(); ++i) {
-    WELLSPACE_RETURN_IF_ERROR(CheckAt(i));
+    WELLSPACE_RETURN_IF_ERROR(CheckAt(i, context_));
     if (twins_[i] != kNoSimplex || !AreKept(RowOf(onto_, i))) {
       continue;
     }
@@ -183,6 +189,7 @@ absl::Status TwinSearch<D>::MatchOthers() {
         begin, end, corners, [&](uint32_t k, const Corners& wanted) { return SortedRowOf(from_, k) < wanted; });
     if (found != end && SortedRowOf(from_, *found) == corners) {
       twins_[i] = *found;
+      has_twin_[*found] = true;
     }
   }
   return absl::OkStatus();
@@ -201,9 +208,7 @@ struct ChangedSimplices {
   absl::Status Find(const MeshView& mesh, const IsChanged& is_changed, const RunContext& context) {
     const size_t count = mesh.simplices.size() / (D + 1);
     for (size_t i = 0; i < count; ++i) {
-      if (i % kStepsBetweenChecks == 0) {
-        WELLSPACE_RETURN_IF_ERROR(context.Check());
-      }
+      WELLSPACE_RETURN_IF_ERROR(CheckAt(i, context));
       if (is_changed(i)) {
         numbers.push_back(static_cast<uint32_t>(i));
         simplices.insert(simplices.end(), &mesh.simplices[i * (D + 1)], &mesh.simplices[i * (D + 1)] + D + 1);

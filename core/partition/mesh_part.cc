@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/check_at.h"
 #include "core/base/status_macros.h"
 #include "core/partition/facets_of.h"
 
@@ -18,9 +19,7 @@ constexpr uint32_t kNoOwner = std::numeric_limits<uint32_t>::max();
 template <typename Visit>
 absl::Status ForEach(uint64_t count, const RunContext& context, const Visit& visit) {
   for (uint64_t i = 0; i < count; ++i) {
-    if (i % kStepsBetweenChecks == 0) {
-      WELLSPACE_RETURN_IF_ERROR(context.Check());
-    }
+    WELLSPACE_RETURN_IF_ERROR(CheckAt(i, context));
     visit(i);
   }
   return absl::OkStatus();

@@ -9,6 +9,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "core/base/check_at.h"
 #include "core/base/memory/huge_pages.h"
 #include "core/base/run_context.h"
 #include "core/base/status_macros.h"
@@ -104,9 +105,7 @@ absl::Status TakeRows(const Values& values, std::span<const uint32_t> rows, size
   }
   taken.reserve(rows.size() * width);
   for (size_t i = 0; i < rows.size(); ++i) {
-    if (i % kStepsBetweenChecks == 0) {
-      WELLSPACE_RETURN_IF_ERROR(context.Check());
-    }
+    WELLSPACE_RETURN_IF_ERROR(CheckAt(i, context));
     const auto row = values.begin() + static_cast<ptrdiff_t>(rows[i] * width);
     taken.insert(taken.end(), row, row + static_cast<ptrdiff_t>(width));
   }

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/check_at.h"
 #include "core/base/status_macros.h"
 #include "core/partition/facets_of.h"
 
@@ -174,7 +175,7 @@ absl::Status EvenOut(uint32_t parts, uint64_t most, const RunContext& context, H
   const auto give = [&](uint32_t from, uint32_t to) {
     wanted.Move(from, to);
     short_of.push_back(to);
-    return short_of.size() % kStepsBetweenChecks == 0 ? context.Check() : absl::OkStatus();
+    return CheckAt(short_of.size(), context);
   };
   for (uint32_t part = 0; part < parts; ++part) {
     if (sizes[part] == 0) {
@@ -234,17 +235,13 @@ absl::StatusOr<DualGraph> FindDualGraph(int dimension, std::span<const uint32_t>
   graph.neighbours.resize(2 * pairs.size());
   HugeVector<int32_t> next(graph.first.begin(), graph.first.end());
   for (size_t i = 0; i < pairs.size(); ++i) {
-    if (i % kStepsBetweenChecks == 0) {
-      WELLSPACE_RETURN_IF_ERROR(context.Check());
-    }
+    WELLSPACE_RETURN_IF_ERROR(CheckAt(i, context));
     const auto& [a, b] = pairs[i];
     graph.neighbours[next[a]++] = b;
     graph.neighbours[next[b]++] = a;
   }
   for (uint64_t s = 0; s < count; ++s) {
-    if (s % kStepsBetweenChecks == 0) {
-      WELLSPACE_RETURN_IF_ERROR(context.Check());
-    }
+    WELLSPACE_RETURN_IF_ERROR(CheckAt(s, context));
     std::sort(graph.neighbours.begin() + graph.first[s], graph.neighbours.begin() + graph.first[s + 1]);
   }
   return graph;

@@ -14,6 +14,7 @@
 #include "core/base/sort_few.h"
 #include "core/base/status_macros.h"
 #include "core/geometry/exact_measure.h"
+#include "core/geometry/largest_coordinate.h"
 #include "core/geometry/point.h"
 #include "core/geometry/vector_product.h"
 
@@ -31,10 +32,7 @@ class Flips {
       : points_(points), simplices_(simplices), solids_(solids), context_(context) {}
 
   absl::StatusOr<uint64_t> Run() {
-    for (size_t i = 0; i < points_.size(); ++i) {
-      WELLSPACE_RETURN_IF_ERROR(CheckAt(i, context_));
-      largest_ = std::max(largest_, std::abs(points_[i]));
-    }
+    WELLSPACE_ASSIGN_OR_RETURN(largest_, LargestCoordinate(points_, context_));
     std::vector<uint32_t> flat;
     for (uint32_t s = 0; s < solids_.size(); ++s) {
       WELLSPACE_RETURN_IF_ERROR(CheckAt(s, context_));
@@ -256,7 +254,7 @@ class Flips {
   const RunContext& context_;
   absl::flat_hash_map<uint32_t, std::vector<uint32_t>> around_;  // by vertex of a flat one: tetrahedra, ascending
   std::vector<bool> is_gone_;                                    // by tetrahedron
-  double largest_ = 0;                                           // of all coordinates, without signs
+  double largest_ = 0;                                           // LargestCoordinate
   size_t looked_at_ = 0;
 };
 

@@ -250,9 +250,7 @@ absl::StatusOr<std::vector<uint32_t>> Locator<D>::CurveOrder(std::span<const dou
                                                              const RunContext& context) const {
   std::vector<std::pair<uint64_t, uint32_t>> places(points.size() / D);
   for (size_t i = 0; i < places.size(); ++i) {
-    if (i % kStepsBetweenChecks == 0) {
-      WELLSPACE_RETURN_IF_ERROR(context.Check());
-    }
+    WELLSPACE_RETURN_IF_ERROR(CheckAt(i, context));
     places[i] = {levels_.empty() ? 0 : CurvePlace<D>(PointAt<D>(points, i), all_, cells_per_unit_),
                  static_cast<uint32_t>(i)};
   }

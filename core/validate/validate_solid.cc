@@ -16,6 +16,7 @@
 #include "core/base/status_macros.h"
 #include "core/features/union_find.h"
 #include "core/geometry/exact_measure.h"
+#include "core/geometry/largest_coordinate.h"
 #include "core/geometry/point.h"
 #include "core/geometry/vector_product.h"
 #include "core/simplex/boundary.h"
@@ -259,10 +260,7 @@ class SolidChecker {
   absl::Status CheckSpheres() const {
     constexpr double kRoundingOfPlace = 0x1p-40;
     constexpr double kRoundingOfRadius = 1e-10;
-    double largest = 0;
-    for (const double x : mesh_.points) {
-      largest = std::max(largest, std::abs(x));
-    }
+    WELLSPACE_ASSIGN_OR_RETURN(const double largest, LargestCoordinate(mesh_.points, context_));
     return CheckEmptySpheres<3>(mesh_, "tetrahedron", "circumsphere", context_, [&](double depth, double radius) {
       return depth <= kRoundingOfPlace * largest + kRoundingOfRadius * radius;
     });
