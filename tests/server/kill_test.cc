@@ -1,9 +1,7 @@
 // The real server, killed again and again among clients that go on: all that it has acknowledged is there.
 #include <signal.h>
 
-#include <atomic>
 #include <chrono>
-#include <memory>
 #include <mutex>
 #include <optional>
 #include <random>
@@ -11,7 +9,6 @@
 #include <thread>
 #include <vector>
 
-#include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
 #include "gtest/gtest.h"
 #include "server/store/check_data.h"
@@ -68,34 +65,16 @@ TEST(Kill, WhatWasAcknowledgedIsThere) {
   std::minstd_rand random(seed);
   const TestFolder folder;
   MortalServer server(folder.path());
-  std::atomic<bool> is_over = false;
-  std::vector<std::unique_ptr<Recorder>> clients;
-  std::vector<std::jthread> threads;
-  const absl::Cleanup end = [&] { is_over = true; };  // an exception, too, is no reason to wait for ever
-  for (int i = 0; i < kClients; ++i) {
-    clients.push_back(std::make_unique<Recorder>(std::vector<std::string>{server.address()}, i, is_over));
-    threads.emplace_back([client = clients.back().get()] { client->Run(); });
-  }
-  for (int i = 0; i < kKills && !HasFailure(); ++i) {
+  const Recorded recorded = RecordAmongFaults({server.address()}, kClients, kKills, [&](int /*kill*/) {
     std::this_thread::sleep_for(std::chrono::milliseconds(random() % 150));
     server.KillAndRestart();
-  }
-  is_over = true;
-  int lives = 0;
-  for (int i = 0; i < kClients; ++i) {
-    threads[i].join();
-    lives += clients[i]->lives();
-  }
-  EXPECT_GT(lives, 0);
-  for (const auto& client : clients) {
-    client->CheckAll();
-  }
+  });
   EXPECT_EQ(server.Stop(), 0);
   const absl::StatusOr<DataReport> report = CheckData(folder.path());
   ASSERT_TRUE(report.ok()) << report.status();
   EXPECT_TRUE(report->is_whole()) << report->problems[0];
   EXPECT_TRUE(report->unknown.empty()) << report->unknown[0];
-  RecordProperty("sessions", lives);
+  RecordProperty("sessions", recorded.lives);
 }
 
 }  // namespace

@@ -3,8 +3,6 @@
 #include <signal.h>
 
 #include <algorithm>
-#include <array>
-#include <atomic>
 #include <chrono>
 #include <filesystem>
 #include <fstream>
@@ -16,7 +14,6 @@
 #include <utility>
 #include <vector>
 
-#include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
 #include "client/client.h"
@@ -231,29 +228,11 @@ TEST_F(ProxyTest, NothingIsLostAmongClientsThatGoOn) {
   const uint32_t seed = std::random_device()();
   SCOPED_TRACE(absl::StrCat("seed ", seed));
   std::minstd_rand random(seed);
-  std::atomic<bool> is_over = false;
-  std::vector<std::unique_ptr<Recorder>> clients;
-  std::vector<std::jthread> threads;
-  const absl::Cleanup end = [&] { is_over = true; };  // an exception, too, is no reason to wait for ever
-  for (int i = 0; i < kClients; ++i) {
-    clients.push_back(std::make_unique<Recorder>(std::vector<std::string>{proxy_address_}, i, is_over));
-    threads.emplace_back([client = clients.back().get()] { client->Run(); });
-  }
-  for (int i = 0; i < kFaults && !HasFailure(); ++i) {
+  const Recorded recorded = RecordAmongFaults({proxy_address_}, kClients, kFaults, [&](int i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(200 + random() % 1000));
     Suffer(i, random() % kServers);
-  }
-  is_over = true;
-  int lives = 0;
-  for (int i = 0; i < kClients; ++i) {
-    threads[i].join();
-    lives += clients[i]->lives();
-  }
-  EXPECT_GT(lives, 0);
-  for (const auto& client : clients) {
-    client->CheckAll();
-  }
-  RecordProperty("sessions", lives);
+  });
+  RecordProperty("sessions", recorded.lives);
 }
 
 }  // namespace

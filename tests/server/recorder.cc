@@ -4,6 +4,7 @@
 #include <chrono>
 #include <thread>
 
+#include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include "grpcpp/grpcpp.h"
@@ -258,6 +259,33 @@ void Recorder::Live() {
   } else if (goes_on) {
     kept_.push_back(known);
   }
+}
+
+Recorded RecordAmongFaults(const std::vector<std::string>& addresses, int clients, int faults,
+                           const std::function<void(int)>& fault) {
+  std::atomic<bool> is_over = false;
+  std::vector<std::unique_ptr<Recorder>> recorders;
+  std::vector<std::jthread> threads;
+  const absl::Cleanup end = [&] { is_over = true; };  // an exception, too, is no reason to wait for ever
+  for (int i = 0; i < clients; ++i) {
+    recorders.push_back(std::make_unique<Recorder>(addresses, i, is_over));
+    threads.emplace_back([recorder = recorders.back().get()] { recorder->Run(); });
+  }
+  for (int i = 0; i < faults && !::testing::Test::HasFailure(); ++i) {
+    fault(i);
+  }
+  is_over = true;
+  Recorded recorded;
+  for (int i = 0; i < clients; ++i) {
+    threads[i].join();
+    recorded.lives += recorders[i]->lives();
+    recorded.redirected += recorders[i]->redirected();
+  }
+  EXPECT_GT(recorded.lives, 0);
+  for (const auto& recorder : recorders) {
+    recorder->CheckAll();
+  }
+  return recorded;
 }
 
 }  // namespace wellspace::server

@@ -99,6 +99,17 @@ class Recorder {
   std::vector<std::string> deleted_;
 };
 
+// What clients have done that go on while there are faults.
+struct Recorded {
+  int lives = 0;
+  int redirected = 0;
+};
+
+// Has `clients` clients of `addresses` live sessions, and calls fault(i) for i from 0 to `faults` - 1 meanwhile, until
+// the first failure. Expects all acknowledged data to be there in the end.
+Recorded RecordAmongFaults(const std::vector<std::string>& addresses, int clients, int faults,
+                           const std::function<void(int)>& fault);
+
 }  // namespace wellspace::server
 
 #endif  // WELLSPACE_TESTS_SERVER_RECORDER_H_

@@ -13,7 +13,6 @@
 #include <utility>
 #include <vector>
 
-#include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include "client/client.h"
@@ -358,33 +357,13 @@ TEST_F(ReplicasTest, NothingIsLostAmongClientsThatGoOn) {
   SCOPED_TRACE(absl::StrCat("seed ", seed));
   std::minstd_rand random(seed);
   MortalReplicas replicas([this](const std::string& name) { return Options(name); }, errors_.path());
-  std::atomic<bool> is_over = false;
-  std::vector<std::unique_ptr<Recorder>> clients;
-  std::vector<std::jthread> threads;
-  const absl::Cleanup end = [&] { is_over = true; };  // an exception, too, is no reason to wait for ever
-  for (int i = 0; i < kClients; ++i) {
-    clients.push_back(std::make_unique<Recorder>(replicas.addresses(), i, is_over));
-    threads.emplace_back([client = clients.back().get()] { client->Run(); });
-  }
-  for (int i = 0; i < kFaults && !HasFailure(); ++i) {
+  const Recorded recorded = RecordAmongFaults(replicas.addresses(), kClients, kFaults, [&](int i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(200 + random() % 1000));
     replicas.Suffer(i, random() % replicas.addresses().size());
-  }
-  is_over = true;
-  int lives = 0;
-  int redirected = 0;
-  for (int i = 0; i < kClients; ++i) {
-    threads[i].join();
-    lives += clients[i]->lives();
-    redirected += clients[i]->redirected();
-  }
-  EXPECT_GT(lives, 0);
-  for (const auto& client : clients) {
-    client->CheckAll();
-  }
+  });
   replicas.Stop();
-  RecordProperty("sessions", lives);
-  RecordProperty("redirected", redirected);
+  RecordProperty("sessions", recorded.lives);
+  RecordProperty("redirected", recorded.redirected);
 }
 
 }  // namespace
