@@ -138,7 +138,7 @@ def load(path: str | os.PathLike[str]) -> dict[str, Any]:
             arrays = pathlib.Path(folder) / "mesh.npz"
             _tool.convert(path, arrays)
             return load(arrays)
-    return _attributes(arrays_of(path), path)
+    return attributes_of(arrays_of(path), path)
 
 
 def arrays_of(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -150,7 +150,7 @@ def arrays_of(path: str | os.PathLike[str]) -> dict[str, Any]:
         raise InvalidArgumentError(f"{path}: expected .npz, with arrays of numbers: {error}", field="path") from error
 
 
-def _attributes(found: dict[str, Any], path: str | os.PathLike[str]) -> dict[str, Any]:
+def attributes_of(found: dict[str, Any], path: str | os.PathLike[str]) -> dict[str, Any]:
     """The attributes of the mesh of these arrays, which are checked."""
     points, simplices = _checked(found, path)
     d, kind = points.shape[1], np.int32 if len(points) <= 2**31 else np.int64

@@ -101,7 +101,7 @@ class MeshPart(Mesh):
             The file has no part of a mesh.
         """
         found = _files.arrays_of(path)
-        attributes = _files.load(path)
+        attributes = _files.attributes_of(found, path)
         n, m, f = (len(attributes[name]) for name in ("points", "simplices", "facets"))
         sizes = dict(zip(_ARRAYS, (n, n, n, m, m, f)))
         if "part" not in found or found["part"].shape != (4,):
