@@ -22,6 +22,7 @@ add_module_names = False
 
 html_theme = "alabaster"
 html_title = f"wellspace {version}"
-html_theme_options = {"description": "Quality simplicial meshes, from Python", "page_width": "70em", "show_powered_by": False}
+html_theme_options = {"description": "Quality simplicial meshes, from Python", "page_width": "70em",
+                      "show_powered_by": False}
 html_show_sphinx = False
 html_copy_source = False

@@ -72,7 +72,7 @@ class KeptProducts {
     (void)MakePlaceFor(mesh->revision());  // freed without mutex_, and before another takes memory
     WELLSPACE_ASSIGN_OR_RETURN(Made made, make(*mesh));
     std::lock_guard lock(mutex_);
-    // Not one of a mesh that was replaced meanwhile: nobody would take it away.
+    // Not one of a mesh that was replaced meanwhile: no change would take it away.
     if (!is_replaced_ && (kept_.empty() || kept_.front()->revision == made->revision)) {
       kept_.push_back(made);
     }
@@ -89,7 +89,7 @@ class KeptProducts {
   // Whether one is being made now.
   bool IsMaking() const { return is_making_; }
 
-  // The bytes that GiveUp would free: those of products that nobody uses.
+  // The bytes that GiveUp would free: those of products that no caller uses.
   uint64_t SpareBytes() const {
     std::lock_guard lock(mutex_);
     uint64_t bytes = 0;
@@ -98,7 +98,7 @@ class KeptProducts {
     }
     return bytes;
   }
-  // Hands over the products that nobody uses, for the caller to free them without a lock.
+  // Hands over the products that no caller uses, for the caller to free them without a lock.
   [[nodiscard]] std::vector<Made> GiveUp() {
     std::lock_guard lock(mutex_);
     return TakeIf(IsSpare);

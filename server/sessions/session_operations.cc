@@ -222,7 +222,7 @@ bool Session::EndWork(Operation& operation, WorkResult& result) {
       occupancy_.EndBusy(clock_.since_boot());
     }
   }
-  result.work.mesh = nullptr;  // nobody but the session has an earlier mesh, so that it can be given up
+  result.work.mesh = nullptr;  // the session alone has an earlier mesh, so that it can be given up
   YieldEarlierMesh();
   operation.Notify();
   NoteIdle();
@@ -247,7 +247,7 @@ Session::Retired Session::RetireMesh() {
   }
   const uint64_t epoch = work_.mesh->record().epoch();
   if (epoch != 0 && epoch != state_->epoch) {
-    // Another owner has made the file, and no record names it any more: whoever clears the folder up may take it.
+    // Another owner has made the file, and no record names it any more: it may go when the folder is cleared up.
     return {.located = {}, .mesh = nullptr};
   }
   return {.located = earlier_locator_.Replace(locator_.Drop()), .mesh = std::exchange(earlier_mesh_, work_.mesh)};

@@ -1,5 +1,5 @@
-"""Parts of meshes, from files and from sessions: they add up to the mesh; Gmsh and VTK read them; a parallel solver gets
-the solution of one rank.
+"""Parts of meshes, from files and from sessions: they add up to the mesh; Gmsh and VTK read them; a parallel solver
+gets the solution of one rank.
 
 Wants gmsh, python3-gmsh and python3-vtk9, and python3-mpi4py and python3-petsc4py, as deploy/install-deps.sh installs
 them for interoperability and solvers; what is not installed is skipped.
@@ -58,8 +58,8 @@ class Parts(unittest.TestCase):
         result = subprocess.run([*mpi, sys.executable, *(["-c"] if "\n" in str(script) else []), str(script),
                                  *map(str, arguments)], cwd=self.folder, text=True, timeout=240,
                                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                                env=os.environ | {"WELLSPACE_SERVER": server, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-                                                  "OMP_NUM_THREADS": "1"})
+                                env=os.environ | {"WELLSPACE_SERVER": server, "OMPI_ALLOW_RUN_AS_ROOT": "1",
+                                                  "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMP_NUM_THREADS": "1"})
         self.assertEqual(result.returncode, 0, result.stdout)
         return result.stdout
 
@@ -95,7 +95,8 @@ class Parts(unittest.TestCase):
 
     def test_what_cannot_be_is_refused(self):
         for options, words in ((("--parts", 2, "-o", "p.su2"), "parts are written to"),
-                               (("--parts", 0, "-o", "p.npz"), "--parts"), (("--ghost-layers", 1, "-o", "p.npz"), "--parts"),
+                               (("--parts", 0, "-o", "p.npz"), "--parts"),
+                               (("--ghost-layers", 1, "-o", "p.npz"), "--parts"),
                                (("--parts", 2, "-o", "p.npz", "--order", 2), "--order and --parts"),
                                (("--parts", 2, "-o", "p.npz", "--no-boundary"), "--no-boundary and --parts"),
                                (("--parts", 2, "-o", "p.vtu", "--format", "vtu"), "--format and --parts"),
@@ -177,8 +178,8 @@ print(json.dumps([reader.GetOutput().GetNumberOfCells(), int((ghosts != 0).sum()
             for array in cut.files:
                 numpy.testing.assert_array_equal(got[array], cut[array])
             self.assertEqual(figures["own_vertices"], int(cut["part"][2]))
-        self.assertIn("part 2 of 3", self.run_tool_for_notes("download", name, "--parts", 3, "--part", 2, "-o", "got.vtu",
-                                                             *remote))
+        self.assertIn("part 2 of 3", self.run_tool_for_notes("download", name, "--parts", 3, "--part", 2,
+                                                             "-o", "got.vtu", *remote))
         for options, words in ((("--parts", 2, "-o", "p.npz"), "--part"), (("--part", 2, "-o", "p.npz"), "--parts"),
                                (("--parts", 2, "--part", 2, "-o", "p.npz"), "the last is 1"),
                                (("--parts", 2, "--part", 1, "-o", "p.msh"), "a part is written to .vtu or .npz"),

@@ -1,4 +1,5 @@
-"""A Debian of its own in a folder, for tests of what is installed there. Wants root, debootstrap, unshare and a mirror."""
+"""A Debian of its own in a folder, for tests of what is installed there. Wants root, debootstrap, unshare and a
+mirror."""
 
 import os
 import pathlib
@@ -18,8 +19,8 @@ def is_possible(*tools):
 
 def run_here(*command):
     """Runs a command, which must succeed; returns what it prints."""
-    done = subprocess.run(list(map(str, command)), stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=_LONG,
-                          check=False)
+    done = subprocess.run(list(map(str, command)), stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                          timeout=_LONG, check=False)
     assert done.returncode == 0, f"{command}\n{done.stdout[-8000:]}\n{done.stderr[-8000:]}"
     return done.stdout
 

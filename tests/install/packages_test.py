@@ -15,7 +15,8 @@ import chroot
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = pathlib.Path(os.environ["WELLSPACE_BIN_DIR"]).parent
-PACKAGES = ["wellspace", "wellspaced", "libwellspace-dev", "libwellspace-core-dev", "python3-wellspace", "wellspace-doc"]
+PACKAGES = ["wellspace", "wellspaced", "libwellspace-dev", "libwellspace-core-dev", "python3-wellspace",
+            "wellspace-doc"]
 
 PYTHON = """
 import sys, numpy, wellspace
@@ -90,7 +91,8 @@ class Packages(unittest.TestCase):
 
     def test_1_pages_and_examples(self):
         folder = self.root.path / "usr/share/doc/wellspace-doc"
-        for path in ("README.md", "docs/python.md", "docs/images/ocean.png", "examples/spot.csv", "examples/python/plate.py"):
+        for path in ("README.md", "docs/python.md", "docs/images/ocean.png", "examples/spot.csv",
+                     "examples/python/plate.py"):
             self.assertTrue((folder / path).is_file(), path)
         for page in folder.rglob("*.md"):
             for link in re.findall(r"\]\(([^)#\s:]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
@@ -104,7 +106,8 @@ class Packages(unittest.TestCase):
     def test_2_the_core_is_built_against_without_grpc_and_hdf5(self):
         (package,) = self.work.glob("libwellspace-core-dev_*.deb")
         self.root.apt("install", f"/work/{package.name}", "g++", "cmake", "make", "pkg-config")
-        others = [one for one in self.packages_there() if re.match(r"libgrpc.*-dev|libprotobuf-dev|libhdf5|protobuf-", one)]
+        others = [one for one in self.packages_there()
+                  if re.match(r"libgrpc.*-dev|libprotobuf-dev|libhdf5|protobuf-", one)]
         self.assertEqual(others, [])
         shutil.copytree(ROOT / "tests" / "install", self.work / "core-alone")
         self.root.run("cmake", "-S", "/work/core-alone/core", "-B", "/work/alone")

@@ -1,4 +1,5 @@
-"""The wheel of scripts/wheel: what is in it, and that it meshes where nothing of ours, and no library of ours, is installed.
+"""The wheel of scripts/wheel: what is in it, and that it meshes where nothing of ours, and no library of ours, is
+installed.
 
 The roots have Python, venv with pip, numpy, grpcio and protobuf of their distribution, which pip finds there: the wheel
 wants the last three, and nothing asks a network. Wants root, debootstrap, unshare and a mirror; takes some minutes.
@@ -71,7 +72,8 @@ class Wheel(unittest.TestCase):
                 dynamic = output_of("readelf", "-d", self.unpacked / name)
                 needed = set(re.findall(r"\(NEEDED\) .*\[(.*)\]", dynamic))
                 outside = needed - libraries
-                self.assertTrue(all(re.match(r"lib(c|m|dl|rt|pthread|resolv)\.so|ld-linux", one) for one in outside), outside)
+                self.assertTrue(all(re.match(r"lib(c|m|dl|rt|pthread|resolv)\.so|ld-linux", one) for one in outside),
+                                outside)
                 expected = "$ORIGIN/../lib" if "/bin/" in name else "$ORIGIN"
                 self.assertEqual(re.findall(r"\((RPATH|RUNPATH)\).*\[(.*)\]", dynamic), [("RPATH", expected)], name)
 
@@ -86,14 +88,16 @@ class Wheel(unittest.TestCase):
         for path in (self.unpacked / PROGRAMS / "lib").iterdir():
             source = os.path.realpath(f"/usr/lib/x86_64-linux-gnu/{path.name}")
             names = [source, source.removeprefix("/usr")]  # on a merged /usr, either may be registered
-            found = subprocess.run(["dpkg-query", "--search", *names], capture_output=True, text=True, check=False).stdout
+            found = subprocess.run(["dpkg-query", "--search", *names], capture_output=True, text=True,
+                                   check=False).stdout
             self.assertIn(found.split(":")[0], packages, path.name)
         self.assertTrue(all((folder / package).stat().st_size > 100 for package in packages))
 
     def install_and_mesh(self, suite):
         root = chroot.Root(self.folder / suite, suite)
         self.addCleanup(shutil.rmtree, root.path)
-        root.apt("install", "python3", "python3-venv", "python3-pip", "python3-numpy", "python3-grpcio", "python3-protobuf")
+        root.apt("install", "python3", "python3-venv", "python3-pip", "python3-numpy", "python3-grpcio",
+                 "python3-protobuf")
         shutil.copy(self.wheel, root.path / "work")
         shutil.copy(ROOT / "examples" / "spot.csv", root.path / "work")
         root.run("python3", "-m", "venv", "--system-site-packages", "/work/venv")
@@ -103,7 +107,8 @@ class Wheel(unittest.TestCase):
         self.assertLessEqual(time.monotonic() - start, MOST_SECONDS)
         self.assertRegex(output, r"^\d{4} /work/venv/lib/python3\.\d+/site-packages/wellspace/__init__\.py\n$")
         # The same bits as from the programs of the build.
-        chroot.run_here(BUILD / "bin/wellspace", "mesh", ROOT / "examples/spot.csv", "-o", self.folder / "spot.npz", "--quiet")
+        chroot.run_here(BUILD / "bin/wellspace", "mesh", ROOT / "examples/spot.csv", "-o", self.folder / "spot.npz",
+                        "--quiet")
         here, there = numpy.load(self.folder / "spot.npz"), numpy.load(root.path / "work/spot.npz")
         for name in ("points", "simplices"):
             numpy.testing.assert_array_equal(here[name], there[name])

@@ -192,7 +192,7 @@ TEST(PartitionTest, ACancelEndsItAtOnce) {
   EXPECT_LT(taken, std::chrono::milliseconds(1000));
 }
 
-// A process may have been started so; then the kernel tells nobody how another one has ended.
+// A process may have been started so; then the kernel does not tell how another one has ended.
 TEST(PartitionTest, IsTheSameWhereEndedProcessesAreIgnored) {
   const DualGraph graph = GraphOf(KuhnGrid(3, 6));
   const HugeVector<uint32_t> expected = PartsOf(graph, {.parts = 8});

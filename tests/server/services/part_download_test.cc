@@ -1,4 +1,4 @@
-// DownloadMesh of parts: they add up to the mesh, whoever asks and whenever; and what is refused.
+// DownloadMesh of parts: they add up to the mesh, in any order of calls; and what is refused.
 #include <algorithm>
 #include <cstdint>
 #include <memory>

@@ -213,7 +213,7 @@ TEST_P(TransferValuesTest, MeansKeepTheIntegral) {
 TEST_P(TransferValuesTest, TheEarlierMeshThatAClientHasIsKept) {
   const std::string name = CreateRefined();
   const ClientMesh first = Download(name);
-  RefineFurther(name);  // a mesh that nobody has
+  RefineFurther(name);  // a mesh that no client has
   RefineFurther(name);
   EXPECT_TRUE(Locate(name, first.revision).ok());
   EXPECT_TRUE(Transfer(From(name, first.revision, v1::FIELD_PLACE_VERTICES, 2), first.points).status.ok());

@@ -39,7 +39,7 @@ class Session(SessionQueries):
     """A session of a server. Thread-safe.
 
     As a context manager it is deleted at the end of the block, on the server, with its points and its mesh. Without
-    ``with`` it stays there until `delete`, or until nobody has used it for its `ttl`; `close` ends the use of this
+    ``with`` it stays there until `delete`, or until no call has used it for its `ttl`; `close` ends the use of this
     object alone, and `attach` comes back to the session.
 
     Calls take `timeout`, in seconds for all attempts together, and most of them `cancel`. Those that change the session
