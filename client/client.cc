@@ -41,7 +41,7 @@ absl::StatusOr<SessionPage> Client::ListSessions(const Labels& labels, const Pag
   return connection_->ListSessions(labels, page, call);
 }
 
-absl::StatusOr<Session> Client::UpdateSession(const std::string& session, const SessionChange& change,
+absl::StatusOr<Session> Client::UpdateSession(const std::string& session, const SessionUpdate& change,
                                               const CallOptions& call) {
   return connection_->UpdateSession(session, change, call);
 }

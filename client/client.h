@@ -71,7 +71,7 @@ class Client {
   // The sessions that have all of `labels`, a page at a time.
   absl::StatusOr<SessionPage> ListSessions(const Labels& labels = {}, const PageOptions& page = {},
                                            const CallOptions& call = {});
-  absl::StatusOr<Session> UpdateSession(const std::string& session, const SessionChange& change,
+  absl::StatusOr<Session> UpdateSession(const std::string& session, const SessionUpdate& change,
                                         const CallOptions& call = {});
   absl::Status DeleteSession(const std::string& session, const CallOptions& call = {});
 

@@ -49,7 +49,7 @@ class Connection {
   virtual absl::StatusOr<Session> GetSession(const std::string& session, const CallOptions& call) = 0;
   virtual absl::StatusOr<SessionPage> ListSessions(const Labels& labels, const PageOptions& page,
                                                    const CallOptions& call) = 0;
-  virtual absl::StatusOr<Session> UpdateSession(const std::string& session, const SessionChange& change,
+  virtual absl::StatusOr<Session> UpdateSession(const std::string& session, const SessionUpdate& change,
                                                 const CallOptions& call) = 0;
   virtual absl::Status DeleteSession(const std::string& session, const CallOptions& call) = 0;
   virtual absl::StatusOr<Uploaded> UploadPoints(const std::string& session, PointSource& source,

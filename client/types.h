@@ -371,8 +371,8 @@ struct SessionOptions {
   std::optional<absl::Duration> ttl;  // absent: the server's default
 };
 
-// A change of a session's settings.
-struct SessionChange {
+// The settings of a session that UpdateSession changes; absent ones stay.
+struct SessionUpdate {
   std::optional<Labels> labels;
   std::optional<absl::Duration> ttl;
 };

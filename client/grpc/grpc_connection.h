@@ -33,7 +33,7 @@ class GrpcConnection final : public Connection {
   absl::StatusOr<Session> GetSession(const std::string& session, const CallOptions& call) override;
   absl::StatusOr<SessionPage> ListSessions(const Labels& labels, const PageOptions& page,
                                            const CallOptions& call) override;
-  absl::StatusOr<Session> UpdateSession(const std::string& session, const SessionChange& change,
+  absl::StatusOr<Session> UpdateSession(const std::string& session, const SessionUpdate& change,
                                         const CallOptions& call) override;
   absl::Status DeleteSession(const std::string& session, const CallOptions& call) override;
   absl::StatusOr<PointsLeft> RemovePoints(const std::string& session, std::span<const uint64_t> points,

@@ -63,7 +63,7 @@ absl::StatusOr<SessionPage> GrpcConnection::ListSessions(const Labels& labels, c
   return result;
 }
 
-absl::StatusOr<Session> GrpcConnection::UpdateSession(const std::string& session, const SessionChange& change,
+absl::StatusOr<Session> GrpcConnection::UpdateSession(const std::string& session, const SessionUpdate& change,
                                                       const CallOptions& call) {
   v1::UpdateSessionRequest request;
   request.mutable_session()->set_name(session);

@@ -39,8 +39,8 @@ const PartNames* NamesOf(const Input& input) {
 
 }  // namespace
 
-template <typename Kind>
-absl::Status MesherOf<Kind>::Initialize(const MeshParameters& parameters, const Input& input, RunContext& context) {
+template <typename Domain>
+absl::Status MesherOf<Domain>::Initialize(const MeshParameters& parameters, const Input& input, RunContext& context) {
   WELLSPACE_RETURN_IF_ERROR(CheckShape(input.points, D));
   WELLSPACE_RETURN_IF_ERROR(CheckInput(input));
   if (const PartNames* const names = NamesOf(input); names != nullptr) {
@@ -59,9 +59,9 @@ absl::Status MesherOf<Kind>::Initialize(const MeshParameters& parameters, const 
   return absl::OkStatus();
 }
 
-template <typename Kind>
-absl::Status MesherOf<Kind>::BuildTree(const MeshParameters& parameters, const char* what, SortedCloud<D>& cloud,
-                                       std::vector<SegmentLists::Ends> segments, const RunContext& context) {
+template <typename Domain>
+absl::Status MesherOf<Domain>::BuildTree(const MeshParameters& parameters, const char* what, SortedCloud<D>& cloud,
+                                         std::vector<SegmentLists::Ends> segments, const RunContext& context) {
   const uint64_t max_vertices = VertexBudget(parameters);
   const uint64_t corners = segments.empty() ? uint64_t{1} << D : 0;
   if (cloud.points.size() + corners > max_vertices) {
@@ -74,20 +74,20 @@ absl::Status MesherOf<Kind>::BuildTree(const MeshParameters& parameters, const c
   return CheckSeparation<D>(frame_, structure_, 0, cloud.first_input, parameters.threads, context);
 }
 
-template <typename Kind>
-uint64_t MesherOf<Kind>::memory_bytes() const {
+template <typename Domain>
+uint64_t MesherOf<Domain>::memory_bytes() const {
   return structure_.MemoryBytes() + refinement_->MemoryBytes() + numbering_.MemoryBytes() + samples_.MemoryBytes() +
          OtherBytes();
 }
 
-template <typename Kind>
-absl::Status MesherOf<Kind>::CheckFeasible(const MeshParameters& parameters) const {
+template <typename Domain>
+absl::Status MesherOf<Domain>::CheckFeasible(const MeshParameters& parameters) const {
   WELLSPACE_RETURN_IF_ERROR(CheckParametersIn(parameters, D));
   return CheckFeasibleHere(parameters);
 }
 
-template <typename Kind>
-absl::Status MesherOf<Kind>::Refine(const MeshParameters& given, RunContext& context) {
+template <typename Domain>
+absl::Status MesherOf<Domain>::Refine(const MeshParameters& given, RunContext& context) {
   WELLSPACE_RETURN_IF_ERROR(CheckParametersIn(given, D));
   WELLSPACE_RETURN_IF_ERROR(CheckDemands(given));
   context.EnterPhase(Phase::kRefinement);
@@ -115,9 +115,9 @@ absl::Status MesherOf<Kind>::Refine(const MeshParameters& given, RunContext& con
 
 // How many vertices a first refinement will end with; 0 if the context knows, or it cannot be said, or it ends too soon
 // to be worth an estimate.
-template <typename Kind>
-absl::StatusOr<uint64_t> MesherOf<Kind>::PredictVertices(const MeshCriteria<D>& criteria,
-                                                         const RunContext& context) const {
+template <typename Domain>
+absl::StatusOr<uint64_t> MesherOf<Domain>::PredictVertices(const MeshCriteria<D>& criteria,
+                                                           const RunContext& context) const {
   if (!IsPredictable() || context.estimated_vertices() > 0 || structure_.vertex_count() > structure_.built_count() ||
       (criteria.sizes.IsUnbounded() && structure_.vertex_count() < kLeastPredicted<D>)) {
     return 0;
@@ -127,10 +127,10 @@ absl::StatusOr<uint64_t> MesherOf<Kind>::PredictVertices(const MeshCriteria<D>& 
   return SaturatedCount(size.vertices);
 }
 
-template <typename Kind>
-absl::StatusOr<std::vector<uint32_t>> MesherOf<Kind>::AddPointsNear(std::span<const double> points,
-                                                                    std::span<const uint32_t> near,
-                                                                    RunContext& context) {
+template <typename Domain>
+absl::StatusOr<std::vector<uint32_t>> MesherOf<Domain>::AddPointsNear(std::span<const double> points,
+                                                                      std::span<const uint32_t> near,
+                                                                      RunContext& context) {
   if (!points.empty()) {
     WELLSPACE_RETURN_IF_ERROR(CheckAdding());
   }
@@ -143,8 +143,8 @@ absl::StatusOr<std::vector<uint32_t>> MesherOf<Kind>::AddPointsNear(std::span<co
   return vertices;
 }
 
-template <typename Kind>
-absl::StatusOr<uint32_t> MesherOf<Kind>::AddVertex(uint32_t near, std::span<const double> point) {
+template <typename Domain>
+absl::StatusOr<uint32_t> MesherOf<Domain>::AddVertex(uint32_t near, std::span<const double> point) {
   WELLSPACE_RETURN_IF_ERROR(CheckAdding());
   const uint32_t count = structure_.vertex_count();
   absl::StatusOr<uint32_t> vertex = adder_->AddVertex(near, point);
@@ -153,8 +153,8 @@ absl::StatusOr<uint32_t> MesherOf<Kind>::AddVertex(uint32_t near, std::span<cons
 }
 
 // Notes the vertices that have been added since there were so many.
-template <typename Kind>
-void MesherOf<Kind>::NoteAdded(uint32_t count_before) {
+template <typename Domain>
+void MesherOf<Domain>::NoteAdded(uint32_t count_before) {
   if (structure_.vertex_count() > count_before) {
     is_refined_ = false;
     ForgetMade();
@@ -162,18 +162,20 @@ void MesherOf<Kind>::NoteAdded(uint32_t count_before) {
   }
 }
 
-template <typename Kind>
-absl::StatusOr<std::vector<double>> MesherOf<Kind>::NearestNeighborDistances(std::span<const uint32_t> vertices) const {
+template <typename Domain>
+absl::StatusOr<std::vector<double>> MesherOf<Domain>::NearestNeighborDistances(
+    std::span<const uint32_t> vertices) const {
   return VertexQueries<D>(frame_, structure_, numbering_).NearestNeighborDistances(vertices);
 }
 
-template <typename Kind>
-absl::StatusOr<std::vector<Cell>> MesherOf<Kind>::ClippedCells(std::span<const uint32_t> vertices, double beta) const {
+template <typename Domain>
+absl::StatusOr<std::vector<Cell>> MesherOf<Domain>::ClippedCells(std::span<const uint32_t> vertices,
+                                                                 double beta) const {
   return VertexQueries<D>(frame_, structure_, numbering_).ClippedCells(vertices, beta);
 }
 
-template <typename Kind>
-absl::StatusOr<Mesh> MesherOf<Kind>::Extract(int threads, RunContext& context) {
+template <typename Domain>
+absl::StatusOr<Mesh> MesherOf<Domain>::Extract(int threads, RunContext& context) {
   WELLSPACE_RETURN_IF_ERROR(CheckRefined(is_refined_, threads));
   if (!MakesByStage()) {
     context.EnterPhase(Phase::kSimplices);
@@ -213,8 +215,8 @@ absl::StatusOr<Mesh> MesherOf<Kind>::Extract(int threads, RunContext& context) {
   return mesh;
 }
 
-template <typename Kind>
-absl::Status MesherOf<Kind>::Update(Mesh& mesh, int threads, RunContext& context) {
+template <typename Domain>
+absl::Status MesherOf<Domain>::Update(Mesh& mesh, int threads, RunContext& context) {
   WELLSPACE_RETURN_IF_ERROR(CheckRefined(is_refined_, threads));
   WELLSPACE_RETURN_IF_ERROR(CheckLastMesh(mesh, D, figures_.extracted_vertices, figures_.extracted_simplices));
   if (MakesAnew(mesh)) {
@@ -254,8 +256,8 @@ absl::Status MesherOf<Kind>::Update(Mesh& mesh, int threads, RunContext& context
 }
 
 // Sets the worst shape of the simplices, some of which have been added.
-template <typename Kind>
-void MesherOf<Kind>::UpdateQuality(const Simplices& added, bool worst_has_gone, Mesh& mesh) const {
+template <typename Domain>
+void MesherOf<Domain>::UpdateQuality(const Simplices& added, bool worst_has_gone, Mesh& mesh) const {
   if (worst_has_gone) {
     const QualityReport report = MeasureQuality({D, mesh.points, mesh.simplices});
     mesh.statistics.max_radius_edge = report.max_radius_edge;
@@ -267,8 +269,8 @@ void MesherOf<Kind>::UpdateQuality(const Simplices& added, bool worst_has_gone, 
 }
 
 // Notes an extracted mesh, and sets its statistics but for those of its simplices' shapes.
-template <typename Kind>
-void MesherOf<Kind>::Finish(Mesh& mesh) {
+template <typename Domain>
+void MesherOf<Domain>::Finish(Mesh& mesh) {
   figures_.NoteMesh(mesh);
   MeshStatistics& statistics = mesh.statistics;
   statistics.input_points = numbering_.input_vertex().size();
@@ -282,8 +284,8 @@ void MesherOf<Kind>::Finish(Mesh& mesh) {
   SetTotals(statistics);
 }
 
-template <typename Kind>
-absl::StatusOr<MeshEstimate> MesherOf<Kind>::Estimate(const MeshParameters& given, const RunContext& context) const {
+template <typename Domain>
+absl::StatusOr<MeshEstimate> MesherOf<Domain>::Estimate(const MeshParameters& given, const RunContext& context) const {
   WELLSPACE_RETURN_IF_ERROR(CheckParametersIn(given, D));
   WELLSPACE_ASSIGN_OR_RETURN(const MeshParameters parameters, WithSizesOfDomain(given, context));
   WELLSPACE_RETURN_IF_ERROR(AllowSamples<D>(parameters, samples_, memory_bytes(), context));

@@ -31,15 +31,15 @@
 
 namespace wellspace::core {
 
-// The mesher of a domain. `Kind` is that of the refinement: BoxDomain<D> (core/refine/box_domain.h), PlaneDomain or
+// The mesher of a domain. `Domain` is that of the refinement: BoxDomain<D> (core/refine/box_domain.h), PlaneDomain or
 // SpaceDomain. BoxMesher, PlaneMesher and SpaceMesher have private functions for the making, the memory and the demands
 // of their domain, and for its results beside vertices and simplices: in groups, by the calls that ask them.
 //
 // Thread safety: as Mesher.
-template <typename Kind>
+template <typename Domain>
 class MesherOf : public Mesher {
  public:
-  static constexpr int D = Kind::kDimension;
+  static constexpr int D = Domain::kDimension;
 
   // The work of Create, for parameters that are valid for this input, and of this dimension.
   absl::Status Initialize(const MeshParameters& parameters, const Input& input, RunContext& context);
@@ -81,7 +81,7 @@ class MesherOf : public Mesher {
   Box<D> meshed_box_;         // of the meshed part, not scaled
   ScaledSamples<D> samples_;  // of the last parameters
   QueryStructure<D> structure_;
-  std::optional<Refinement<Kind>> refinement_;
+  std::optional<Refinement<Domain>> refinement_;
   VertexNumbering<D> numbering_;
   MesherFigures figures_;
   PartNames names_;  // of the input
@@ -97,7 +97,7 @@ class MesherOf : public Mesher {
   // frame_, meshed_box_, structure_, numbering_ and samples_ as they are to be.
   virtual absl::Status Build(const MeshParameters& parameters, const Input& input, RunContext& context) = 0;
   // The domain that is refined, once it is built.
-  virtual Kind ToRefine() = 0;
+  virtual Domain ToRefine() = 0;
   // How points are added; see PointAdder.
   virtual AdderOptions Adding() = 0;
   // Refuses points, where none can be added.

@@ -33,7 +33,7 @@ class MockConnection : public Connection {
   MOCK_METHOD(absl::StatusOr<Session>, GetSession, (const std::string&, const CallOptions&), (override));
   MOCK_METHOD(absl::StatusOr<SessionPage>, ListSessions, (const Labels&, const PageOptions&, const CallOptions&),
               (override));
-  MOCK_METHOD(absl::StatusOr<Session>, UpdateSession, (const std::string&, const SessionChange&, const CallOptions&),
+  MOCK_METHOD(absl::StatusOr<Session>, UpdateSession, (const std::string&, const SessionUpdate&, const CallOptions&),
               (override));
   MOCK_METHOD(absl::Status, DeleteSession, (const std::string&, const CallOptions&), (override));
   MOCK_METHOD(absl::StatusOr<PointsLeft>, RemovePoints,

@@ -196,7 +196,7 @@ int SessionCommand::Show() {
 }
 
 int SessionCommand::Update() {
-  client::SessionChange change;
+  client::SessionUpdate change;
   change.ttl = Ttl();
   if (!labels.empty() || clear_labels) {
     change.labels = labels;
