@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <numbers>
 #include <optional>
 #include <span>
 #include <utility>
@@ -17,6 +18,7 @@
 #include "core/base/status_macros.h"
 #include "core/estimate/calibration.h"
 #include "core/estimate/domain_surroundings.h"
+#include "core/estimate/least_vertices.h"
 #include "core/estimate/mesh_size.h"
 #include "core/estimate/nearest_points.h"
 
@@ -34,6 +36,17 @@ constexpr std::array<double, 2> kRamp = D == 2 ? std::array{-0.5, 1.0} : std::ar
 // Sizes below this part of the longest side count as this: no coordinates could tell such edges apart, and integrals
 // over so few halvings stay finite, whatever is asked for.
 constexpr double kLeastSize = 0x1p-60;
+
+// Of meshes of even clouds, from this rho on: vertices for each point, and for each of n^((D-1)/D) points near the box;
+// vertices in a leaf; room for clouds that are not even. Meshes of more memory are worth a look at the leaves.
+constexpr double kTypicalVertices = 1.5;
+template <int D>
+constexpr double kTypicalOnBoundary = D == 2 ? 4 : 3;
+template <int D>
+constexpr double kTypicalRho = D == 2 ? std::numbers::sqrt2 : 2;
+constexpr double kTypicalInLeaf = 12;
+constexpr double kTypicalRoom = 1.2;
+constexpr double kMostTypicalBytes = 64e6;
 
 // More vertices than any leaf is predicted to take.
 constexpr double kMostInLeaf = 0x1p400;
@@ -529,7 +542,28 @@ absl::StatusOr<SizeEstimate> EstimateSize(const QueryStructure<D>& structure, co
   return estimate;
 }
 
+template <int D>
+std::optional<SizeEstimate> TypicalSize(const QueryStructure<D>& structure, const MeshCriteria<D>& criteria) {
+  if (D > 3 || criteria.criterion != Criterion::kRadiusEdge || criteria.rho < kTypicalRho<D> ||
+      !criteria.sizes.regions().empty() || !criteria.sizes.samples().empty()) {
+    return std::nullopt;
+  }
+  const auto count = static_cast<double>(structure.vertex_count());
+  SizeEstimate size;
+  size.vertices = kTypicalVertices * count + kTypicalOnBoundary<D> * std::pow(count, (D - 1.0) / D) +
+                  TypicalVerticesForShape<D>(structure.box());
+  if (!criteria.sizes.IsUnbounded()) {
+    size.vertices += TypicalVerticesForSizes<D>(structure.box(), criteria.sizes);
+  }
+  size.simplices = kSimplicesPerVertex<D> * size.vertices;
+  const double room = kTypicalRoom * size.vertices;
+  const double leaves = std::max<double>(structure.tree().leaf_count(), room / kTypicalInLeaf);
+  size.bytes = BytesOf<D>({leaves, leaves}, room, kSimplicesPerVertex<D> * room);
+  return size.bytes <= kMostTypicalBytes ? std::optional(size) : std::nullopt;
+}
+
 #define WELLSPACE_INSTANTIATE(D)                                                                          \
+  template std::optional<SizeEstimate> TypicalSize<D>(const QueryStructure<D>&, const MeshCriteria<D>&);  \
   template absl::StatusOr<SizeEstimate> EstimateSize<D>(const QueryStructure<D>&, const MeshCriteria<D>&, \
                                                         const RunContext&, const EstimateEffort&,         \
                                                         const PlanarDomain*);

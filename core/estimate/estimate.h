@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include "absl/status/statusor.h"
 #include "core/base/run_context.h"
@@ -38,6 +39,9 @@ struct EstimateEffort {
 // Enough for a bar of progress, at about a hundredth of the cost of meshing.
 inline constexpr EstimateEffort kGlance{0.15, 24, 64, uint64_t{1} << 11};
 
+// Enough for a reservation of memory, at a few hundredths of the cost of meshing: a run that is short asks for more.
+inline constexpr EstimateEffort kForReservation{0.1, 32, 256, uint64_t{1} << 13};
+
 // Predicts the size of the mesh that refinement of `structure` for `criteria` will make.
 //
 // Shapes:     structure: as QueryStructure::Initialize leaves it; nothing has been refined. domain: the faces that its
@@ -57,6 +61,17 @@ template <int D>
 absl::StatusOr<SizeEstimate> EstimateSize(const QueryStructure<D>& structure, const MeshCriteria<D>& criteria,
                                           const RunContext& context, const EstimateEffort& effort = {},
                                           const PlanarDomain* domain = nullptr);
+
+// The size of a small mesh of the box by numbers alone, for a reservation of memory: a look at any leaf would take
+// longer than a part of the mesh. None where the mesh is large, or numbers say too little: above 3-D, by another
+// criterion or a smaller rho than the default, with sizes in boxes or at samples.
+//
+// Units:      counts and bytes.
+// Guarantees: bytes are at least those of even clouds; points that come ever closer to each other may take more.
+// Complexity: O(1).
+// Source:     docs/design/estimate.md, "For a reservation".
+template <int D>
+std::optional<SizeEstimate> TypicalSize(const QueryStructure<D>& structure, const MeshCriteria<D>& criteria);
 
 }  // namespace wellspace::core
 

@@ -22,12 +22,18 @@ constexpr double kVerticesPerImage = D == 2 ? 0.5 : 1.2;
 
 template <int D>
 absl::StatusOr<MeshEstimate> EstimateMeshOf(const QueryStructure<D>& structure, const MeshCriteria<D>& criteria,
-                                            const RunContext& context, const PlanarDomain* frame) {
+                                            const RunContext& context, const EstimateEffort& effort,
+                                            const PlanarDomain* frame) {
   if (structure.vertex_count() > structure.built_count()) {
     return absl::FailedPreconditionError(
         "vertices have been inserted since the mesher was created; an estimate is made before that");
   }
-  WELLSPACE_ASSIGN_OR_RETURN(const SizeEstimate size, EstimateSize<D>(structure, criteria, context, {}, frame));
+  WELLSPACE_ASSIGN_OR_RETURN(const SizeEstimate size, EstimateSize<D>(structure, criteria, context, effort, frame));
+  return MeshEstimateOf<D>(structure, size);
+}
+
+template <int D>
+MeshEstimate MeshEstimateOf(const QueryStructure<D>& structure, const SizeEstimate& size) {
   MeshEstimate estimate;
   estimate.vertices = SaturatedCount(size.vertices);
   estimate.simplices = SaturatedCount(size.simplices);
@@ -70,7 +76,9 @@ absl::Status AddImages(const QueryStructure<D>& structure, const PeriodicBox<D>&
 
 #define WELLSPACE_INSTANTIATE(D)                                                                            \
   template absl::StatusOr<MeshEstimate> EstimateMeshOf<D>(const QueryStructure<D>&, const MeshCriteria<D>&, \
-                                                          const RunContext&, const PlanarDomain*);          \
+                                                          const RunContext&, const EstimateEffort&,         \
+                                                          const PlanarDomain*);                             \
+  template MeshEstimate MeshEstimateOf<D>(const QueryStructure<D>&, const SizeEstimate&);                   \
   template absl::Status AddImages<D>(const QueryStructure<D>&, const PeriodicBox<D>&, const RunContext&, MeshEstimate&);
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE

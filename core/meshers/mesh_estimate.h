@@ -6,6 +6,7 @@
 #include "absl/status/statusor.h"
 #include "core/base/run_context.h"
 #include "core/base/saturate.h"
+#include "core/estimate/estimate.h"
 #include "core/geometry/periodic_box.h"
 #include "core/mesh/mesh.h"
 #include "core/refine/criteria.h"
@@ -22,7 +23,11 @@ namespace wellspace::core {
 // Errors:     FAILED_PRECONDITION once vertices have been inserted; those of EstimateSize.
 template <int D>
 absl::StatusOr<MeshEstimate> EstimateMeshOf(const QueryStructure<D>& structure, const MeshCriteria<D>& criteria,
-                                            const RunContext& context, const PlanarDomain* frame = nullptr);
+                                            const RunContext& context, const EstimateEffort& effort = {},
+                                            const PlanarDomain* frame = nullptr);
+// As a mesher hands out this size, of a mesh of `structure`.
+template <int D>
+MeshEstimate MeshEstimateOf(const QueryStructure<D>& structure, const SizeEstimate& size);
 
 // Adds the memory for the repair of slivers, or for pumping, to the estimate of a mesh.
 template <int D>

@@ -17,7 +17,7 @@ absl::Status ReserveMemory(const Mesher& mesher, const MeshParameters& parameter
   if (!context.HasMemoryLender()) {
     return absl::OkStatus();
   }
-  WELLSPACE_ASSIGN_OR_RETURN(const MeshEstimate estimate, mesher.Estimate(parameters, context));
+  WELLSPACE_ASSIGN_OR_RETURN(const MeshEstimate estimate, mesher.EstimateToReserve(parameters, context));
   context.SetEstimatedVertices(estimate.vertices);
   const uint64_t most = VertexBudget(parameters);
   const auto all = static_cast<double>(estimate.memory_bytes);

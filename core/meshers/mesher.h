@@ -29,18 +29,18 @@ class Mesher {
  public:
   virtual ~Mesher() = default;
 
-  // Builds the tree over the points of `input`, in their box; or in the plane for the domain that its features make of
-  // them (docs/design/features.md). Only faces that are meshed are in the mesh: points of such a domain that touch none
-  // of it have no vertex.
+  // Builds the tree over the points of `input`, in their box; or for the domain that its features make of them:
+  // segments in the plane (docs/design/features.md), triangles in space (docs/design/surfaces.md). Only faces and
+  // solids that are meshed are in the mesh: points of such a domain that touch none of it have no vertex.
   //
   // Shapes:     points: n x dimension, row-major; n may be 0 when a domain is given.
   // Units:      any length, the same on every axis.
-  // Complexity: O(n log n + L) for L leaves, and with features that of MakeDomainCloud. Reserves memory for them first.
+  // Complexity: O(n log n + L) for L leaves, and with features that of MakeDomainCloud or MakeSpaceCloud. Reserves
+  //             memory for them first.
   // Errors:     INVALID_ARGUMENT (parameters; NaN, infinite or outside coordinates; points closer than double
-  //             arithmetic can serve; of MakePlanarGraph and FindFaces; and for parameters that a domain with features
-  //             does not have: another dimension than 2 or criterion than kRadiusEdge, a box beside another rule than
-  //             kBox), RESOURCE_EXHAUSTED (max_vertices, memory of the context), CANCELLED,
-  //             DEADLINE_EXCEEDED.
+  //             arithmetic can serve; of MakePlanarGraph and FindFaces, and of MakeSpaceCloud; for parameters that the
+  //             domain does not have, by ValidateDomainParameters and ValidateSpaceParameters), RESOURCE_EXHAUSTED
+  //             (max_vertices, memory of the context), CANCELLED, DEADLINE_EXCEEDED.
   // Threads:    uses parameters.threads, at most as many as the machine has cores.
   // Source:     [HT08] Figure 3, INITIALIZE.
   static absl::StatusOr<std::unique_ptr<Mesher>> Create(const MeshParameters& parameters, const Input& input,
@@ -58,8 +58,8 @@ class Mesher {
 
   // Adds Steiner vertices until criterion and sizes of `parameters` are met, then repairs slivers, for which these move
   // too; those of an earlier mesh unless keep_vertices. With pump_weights, Extract gives weights if slivers are left,
-  // or none were to be repaired. All parameters count but dimension, domain, margin and merge_distance: the box is that
-  // of Create.
+  // or none were to be repaired. All parameters count but dimension, domain, margin, merge_distance and periodic_axes:
+  // the box is that of Create.
   //
   // Complexity: O(m) queries the first time and for other demands than the last; else in proportion to the vertices
   //             added since, and in a domain one pass over all.
@@ -129,7 +129,7 @@ class Mesher {
   // Guarantees: (1) the simplices are a Delaunay triangulation of the vertices and decompose exactly the box; (2) the
   //             criterion holds for each; (3) no circumcentre lies outside the box. With weights they are the regular
   //             triangulation, and (2) and (3) are those of the Delaunay triangulation before. Those of a domain are
-  //             in docs/design/features.md.
+  //             in docs/design/features.md and surfaces.md.
   // Complexity: O(m) time and memory.
   // Errors:     FAILED_PRECONDITION unless refined since vertices were last added; RESOURCE_EXHAUSTED (memory of the
   //             context); CANCELLED, DEADLINE_EXCEEDED.
@@ -150,13 +150,21 @@ class Mesher {
   //             DEADLINE_EXCEEDED.
   // Source:     docs/design/estimate.md.
   virtual absl::StatusOr<MeshEstimate> Estimate(const MeshParameters& parameters, const RunContext& context) const = 0;
+
+  // The same for a reservation of memory: it may be farther from the truth, and for small meshes of clouds goes by
+  // numbers alone, with room for uneven ones.
+  //
+  // Complexity: below a twentieth of the time of the mesh of a cloud.
+  // Errors:     as Estimate.
+  virtual absl::StatusOr<MeshEstimate> EstimateToReserve(const MeshParameters& parameters,
+                                                         const RunContext& context) const = 0;
 };
 
 // Checks that the demands are feasible, and reserves the memory that Refine and Extract are estimated to take, of that
 // which the context lends: all of the estimate, and a quarter more, but no more than max_vertices allows; Refine
 // then need not estimate again. Reserves nothing without a lender.
 //
-// Errors:     as of CheckFeasible and Estimate; RESOURCE_EXHAUSTED, or another of the lender.
+// Errors:     as of CheckFeasible and EstimateToReserve; RESOURCE_EXHAUSTED, or another of the lender.
 absl::Status ReserveMemory(const Mesher& mesher, const MeshParameters& parameters, RunContext& context);
 
 // Meshes `input`: Create, ReserveMemory, Refine, Extract.

@@ -285,12 +285,26 @@ void MesherOf<Domain>::Finish(Mesh& mesh) {
 }
 
 template <typename Domain>
-absl::StatusOr<MeshEstimate> MesherOf<Domain>::Estimate(const MeshParameters& given, const RunContext& context) const {
+absl::StatusOr<MeshEstimate> MesherOf<Domain>::EstimateOfTree(const MeshCriteria<D>& criteria, bool is_to_reserve,
+                                                              const RunContext& context) const {
+  if (!is_to_reserve || !IsPredictable()) {
+    return EstimateMeshOf<D>(structure_, criteria, context, {}, planar());
+  }
+  if (const std::optional<SizeEstimate> typical = TypicalSize<D>(structure_, criteria);
+      typical.has_value() && structure_.vertex_count() == structure_.built_count()) {
+    return MeshEstimateOf<D>(structure_, *typical);
+  }
+  return EstimateMeshOf<D>(structure_, criteria, context, kForReservation);
+}
+
+template <typename Domain>
+absl::StatusOr<MeshEstimate> MesherOf<Domain>::EstimateFor(const MeshParameters& given, bool is_to_reserve,
+                                                           const RunContext& context) const {
   WELLSPACE_RETURN_IF_ERROR(CheckParametersIn(given, D));
   WELLSPACE_ASSIGN_OR_RETURN(const MeshParameters parameters, WithSizesOfDomain(given, context));
   WELLSPACE_RETURN_IF_ERROR(AllowSamples<D>(parameters, samples_, memory_bytes(), context));
   const MeshCriteria<D> criteria = CriteriaOf(parameters);
-  WELLSPACE_ASSIGN_OR_RETURN(MeshEstimate estimate, EstimateMeshOf<D>(structure_, criteria, context, planar()));
+  WELLSPACE_ASSIGN_OR_RETURN(MeshEstimate estimate, EstimateOfTree(criteria, is_to_reserve, context));
   estimate.memory_bytes += std::max(samples_.MemoryBytes(), ScaledSamples<D>::BytesFor(parameters));
   WELLSPACE_RETURN_IF_ERROR(AddToEstimate(parameters, criteria, context, estimate));
   return estimate;

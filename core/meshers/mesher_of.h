@@ -56,7 +56,13 @@ class MesherOf : public Mesher {
   absl::StatusOr<std::vector<Cell>> ClippedCells(std::span<const uint32_t> vertices, double beta) const final;
   absl::StatusOr<Mesh> Extract(int threads, RunContext& context) final;
   absl::Status Update(Mesh& mesh, int threads, RunContext& context) final;
-  absl::StatusOr<MeshEstimate> Estimate(const MeshParameters& parameters, const RunContext& context) const final;
+  absl::StatusOr<MeshEstimate> Estimate(const MeshParameters& parameters, const RunContext& context) const final {
+    return EstimateFor(parameters, /*is_to_reserve=*/false, context);
+  }
+  absl::StatusOr<MeshEstimate> EstimateToReserve(const MeshParameters& parameters,
+                                                 const RunContext& context) const final {
+    return EstimateFor(parameters, /*is_to_reserve=*/true, context);
+  }
 
  protected:
   // Simplices, with their weights and faces.
@@ -159,6 +165,11 @@ class MesherOf : public Mesher {
   // Sets the statistics of this kind of domain and of its inputs, and adds to the cost of simplices.
   virtual void AddStatistics(const Mesh& mesh, MeshStatistics& statistics, QueryCounters& stars) const = 0;
 
+  absl::StatusOr<MeshEstimate> EstimateFor(const MeshParameters& given, bool is_to_reserve,
+                                           const RunContext& context) const;
+  // The part that goes by the tree.
+  absl::StatusOr<MeshEstimate> EstimateOfTree(const MeshCriteria<D>& criteria, bool is_to_reserve,
+                                              const RunContext& context) const;
   absl::StatusOr<uint64_t> PredictVertices(const MeshCriteria<D>& criteria, const RunContext& context) const;
   void NoteAdded(uint32_t count_before);
   void UpdateQuality(const Simplices& added, bool worst_has_gone, Mesh& mesh) const;

@@ -61,11 +61,24 @@ TEST(Memory, WhatItIsReservedForIsPredicted) {
   Lender lender(context);
   const absl::StatusOr<std::unique_ptr<Mesher>> mesher = Mesher::Create(parameters, Cloud(), context);
   ASSERT_TRUE(mesher.ok()) << mesher.status();
-  const absl::StatusOr<MeshEstimate> estimate = (*mesher)->Estimate(parameters, context);
+  const absl::StatusOr<MeshEstimate> estimate = (*mesher)->EstimateToReserve(parameters, context);
   ASSERT_TRUE(estimate.ok()) << estimate.status();
   EXPECT_EQ(context.estimated_vertices(), 0u);
   ASSERT_TRUE(ReserveMemory(**mesher, parameters, context).ok());
   EXPECT_EQ(context.estimated_vertices(), estimate->vertices);
+}
+
+TEST(Memory, NumbersAloneReserveEnoughForEvenClouds) {
+  for (const int dimension : {2, 3}) {
+    for (const int count : {1, 10, 100, 1'000, 10'000}) {
+      SCOPED_TRACE(testing::Message() << count << " points in " << dimension << "-D");
+      RunContext context;
+      Lender lender(context);
+      const std::vector<double> points = test::MakeCloud("uniform", dimension, count);
+      ASSERT_TRUE(MeshPoints(MeshParameters{.dimension = dimension}, points, context).ok());
+      EXPECT_LE(lender.peak, lender.reserved.at(1));
+    }
+  }
 }
 
 TEST(Memory, AMeshOfFewVerticesReservesForThem) {

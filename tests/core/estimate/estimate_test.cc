@@ -7,6 +7,8 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -243,6 +245,58 @@ TYPED_TEST(EstimateTest, EndsWhenCancelled) {
   RunContext late;
   late.ExceedDeadline();
   EXPECT_EQ(EstimateSize<D>(structure, RadiusEdge<D>(2), late).status().code(), absl::StatusCode::kDeadlineExceeded);
+}
+
+TEST(TypicalSizeTest, IsThatOfEvenClouds) {
+  for (const int dimension : {2, 3}) {
+    for (const int count : {10, 100, 1'000, 10'000}) {
+      SCOPED_TRACE(testing::Message() << count << " points in " << dimension << "-D");
+      const MeshParameters parameters{.dimension = dimension};
+      RunContext context;
+      const absl::StatusOr<std::unique_ptr<Mesher>> mesher =
+          Mesher::Create(parameters, test::MakeCloud("uniform", dimension, count), context);
+      ASSERT_TRUE(mesher.ok()) << mesher.status();
+      const absl::StatusOr<MeshEstimate> typical = (*mesher)->EstimateToReserve(parameters, context);
+      ASSERT_TRUE(typical.ok()) << typical.status();
+      EXPECT_GE(typical->memory_bytes, (*mesher)->Estimate(parameters, context)->memory_bytes);
+      ASSERT_TRUE((*mesher)->Refine(parameters, context).ok());
+      EXPECT_LE(Factor(typical->vertices, (*mesher)->vertex_count()), 1.3);
+    }
+  }
+}
+
+TEST(TypicalSizeTest, IsNotSaidWhereNumbersSayTooLittle) {
+  const QueryStructure<2> structure = MakeStructure<2>(test::SortedCloud<2>("uniform", 100));
+  const MeshCriteria<2> plain = RadiusEdge<2>(DefaultRho(2));
+  EXPECT_TRUE(TypicalSize<2>(structure, plain).has_value());
+
+  MeshCriteria<2> demands = plain;
+  demands.rho = 1.2;
+  EXPECT_FALSE(TypicalSize<2>(structure, demands).has_value());
+  demands = plain;
+  demands.criterion = Criterion::kWellSpaced;
+  EXPECT_FALSE(TypicalSize<2>(structure, demands).has_value());
+  demands = plain;
+  const Box<2> box = structure.box();
+  demands.sizes = SizeField<2>(box.LongestSide(), {{box, 0.1 * box.LongestSide()}});
+  EXPECT_FALSE(TypicalSize<2>(structure, demands).has_value());
+}
+
+TEST(TypicalSizeTest, KnowsTheSizeAskedForAndTheShapeOfTheBox) {
+  const QueryStructure<2> structure = MakeStructure<2>(test::SortedCloud<2>("uniform", 100));
+  MeshCriteria<2> sized = RadiusEdge<2>(DefaultRho(2));
+  const double side = structure.box().LongestSide();
+  double before = TypicalSize<2>(structure, sized)->vertices;
+  for (const double part : {0.1, 0.03, 0.01}) {
+    sized.sizes = SizeField<2>(part * side);
+    const std::optional<SizeEstimate> size = TypicalSize<2>(structure, sized);
+    ASSERT_TRUE(size.has_value()) << part;
+    EXPECT_GT(size->vertices, before);
+    EXPECT_GE(size->vertices, 0.7 * Estimate<2>(structure, sized).vertices);
+    before = size->vertices;
+  }
+  sized.sizes = SizeField<2>(1e-4 * side);  // of too much memory for a guess
+  EXPECT_FALSE(TypicalSize<2>(structure, sized).has_value());
 }
 
 }  // namespace
