@@ -157,7 +157,9 @@ class Mesher {
   // Complexity: below a twentieth of the time of the mesh of a cloud.
   // Errors:     as Estimate.
   virtual absl::StatusOr<MeshEstimate> EstimateToReserve(const MeshParameters& parameters,
-                                                         const RunContext& context) const = 0;
+                                                         const RunContext& context) const {
+    return Estimate(parameters, context);
+  }
 };
 
 // Checks that the demands are feasible, and reserves the memory that Refine and Extract are estimated to take, of that

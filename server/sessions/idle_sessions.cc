@@ -68,7 +68,7 @@ uint64_t IdleSessions::GiveUpOnce(std::span<const std::shared_ptr<Session>> all,
   }
   uint64_t freed = 0;
   for (const size_t i : ChooseIdle(spares, missing, want)) {
-    const uint64_t bytes = idle[i]->GiveUpMesher();
+    const uint64_t bytes = idle[i]->GiveUpMemory();
     if (bytes > 0) {
       freed += bytes;
       observer_.OnStructureGivenUp({.session = idle[i]->name(),

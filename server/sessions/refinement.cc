@@ -83,7 +83,7 @@ absl::StatusOr<core::Mesh> MeshAgain(const SessionInputs& inputs, const core::Me
 std::shared_ptr<DeltaSnapshot> MakeDelta(const Session& session, const SessionInputs& inputs, const core::Mesh& next,
                                          const core::RunContext& context, const SessionWork& work) {
   const MeshSnapshot& last = *work.mesh;
-  if (!session.deltas().IsWanted(last.revision())) {
+  if (!session.meshes().deltas().IsWanted(last.revision())) {
     return nullptr;
   }
   std::shared_ptr<DeltaSnapshot> made;

@@ -112,6 +112,10 @@ Session::Session(SessionState state, std::vector<store::v1::StepRecord::Points> 
       memory_(memory),
       clock_(std::move(clock)),
       log_(log),
+      meshes_({.session = name(),
+               .are_files = log.is_durable(),
+               .lasts = LastsIn(log),
+               .check = [this] { return CheckHasMesh(); }}),
       occupancy_{.lease = Lease(TtlOf(state), clock_.since_boot())},
       account_(name(), dimension(), !log.is_durable(), options, memory, std::move(tenant_points)),
       stores_{.dimension = dimension(),
@@ -124,8 +128,9 @@ Session::Session(SessionState state, std::vector<store::v1::StepRecord::Points> 
   PointAccount::Held held = HeldBy(state);
   stores_.are_loaded = held.features.all() == 0 && held.sizes == 0 && !state.record.has_rules();
   if (state.record.has_mesh()) {
-    work_.mesh = log_.files().FindMesh(state.record);
-    held.mesh_bytes = work_.mesh->loaded_bytes();
+    const std::shared_ptr<MeshSnapshot> mesh = log_.files().FindMesh(state.record);
+    held.mesh_bytes = mesh->loaded_bytes();
+    meshes_.Restore(mesh);
   }
   account_.Restore(held);
   state_ = std::make_shared<const SessionState>(std::move(state));
@@ -303,28 +308,10 @@ SessionInputs Session::inputs() const {
           .lasts = LastsIn(log_)};
 }
 
-absl::StatusOr<std::shared_ptr<const MeshSnapshot>> Session::KeptMesh(uint64_t revision) const {
+absl::Status Session::CheckHasMesh() const {
   absl::MutexLock lock(&mutex_);
   WELLSPACE_RETURN_IF_ERROR(CheckOpen(occupancy_, name()));
-  WELLSPACE_RETURN_IF_ERROR(CheckMesh(*state_));
-  for (const std::shared_ptr<MeshSnapshot>& mesh : {work_.mesh, earlier_mesh_}) {
-    if (mesh != nullptr && mesh->revision() == revision) {
-      return mesh;
-    }
-  }
-  return MakeError(
-      v1::ERROR_REASON_MESH_NOT_KEPT,
-      absl::StrCat("the mesh of revision ", revision, " is not kept; ", name(), " has that of revision ",
-                   work_.mesh->revision(),
-                   earlier_mesh_ == nullptr ? " alone" : absl::StrCat(" and that of ", earlier_mesh_->revision()),
-                   ". Of earlier ones that which was downloaded, or located points in, last is kept, while memory "
-                   "allows it"),
-      "start.from_revision");
-}
-
-std::shared_ptr<const MeshSnapshot> Session::mesh() const {
-  absl::MutexLock lock(&mutex_);
-  return work_.mesh;
+  return CheckMesh(*state_);
 }
 
 absl::StatusOr<std::shared_ptr<MeshSnapshot>> Session::KeepMesh(core::Mesh mesh,
@@ -369,59 +356,30 @@ void Session::NoteIdle() const {
   }
 }
 
-uint64_t Session::SpareEarlierBytes() const {
-  // A file takes no memory.
-  const bool is_spare = !log_.is_durable() && earlier_mesh_ != nullptr && earlier_mesh_.use_count() == 1;
-  return earlier_locator_.SpareBytes() + (is_spare ? earlier_mesh_->memory_bytes() : 0);
-}
-
 std::optional<Session::Spare> Session::GetSpare() const {
   absl::MutexLock lock(&mutex_);
-  uint64_t bytes = SpareEarlierBytes();
-  if (log_.is_durable() && occupancy_.IsIdle()) {
-    bytes += (work_.mesher == nullptr ? 0 : work_.memory.bytes()) + locator_.SpareBytes() + cuts_.SpareBytes() +
-             deltas_.memory_bytes();
-  }
+  const bool is_idle = log_.is_durable() && occupancy_.IsIdle();
+  const uint64_t bytes = meshes_.SpareBytes(is_idle ? SessionMeshes::Part::kAll : SessionMeshes::Part::kEarlier) +
+                         (is_idle && work_.mesher != nullptr ? work_.memory.bytes() : 0);
   const Lease& lease = occupancy_.lease;
   return bytes == 0
              ? std::nullopt
              : std::optional(Spare{.bytes = bytes, .last_use = lease.ExpiresAt(clock_.since_boot()) - lease.ttl()});
 }
 
-uint64_t Session::GiveUpMesher() {
+uint64_t Session::GiveUpMemory() {
   SessionWork given_up;
-  Retired earlier;
-  std::vector<SessionLocator::Made> located;
-  std::vector<SessionCuts::Made> cuts;
-  std::vector<MeshDeltas::Delta> deltas;
-  uint64_t bytes = 0;
+  SessionMeshes::Dropped dropped;
   {
     absl::MutexLock lock(&mutex_);
-    bytes = SpareEarlierBytes();
-    earlier.located = earlier_locator_.GiveUp();
-    if (!log_.is_durable() && earlier_mesh_ != nullptr && earlier_mesh_.use_count() == 1) {
-      earlier.mesh = std::move(earlier_mesh_);
-    }
-    if (log_.is_durable() && occupancy_.IsIdle() && occupancy_.queries == 0) {
-      located = locator_.GiveUp();
-      cuts = cuts_.GiveUp();
+    const bool is_idle = log_.is_durable() && occupancy_.IsIdle() && occupancy_.queries == 0;
+    dropped = meshes_.GiveUp(is_idle ? SessionMeshes::Part::kAll : SessionMeshes::Part::kEarlier);
+    if (is_idle) {
       given_up = work_.TakeMesher();
-      bytes += deltas_.memory_bytes();
-      deltas = deltas_.GiveUp();
     }
   }
-  bytes += given_up.memory.bytes();
-  for (const SessionLocator::Made& one : located) {
-    bytes += one->memory.bytes();
-  }
-  for (const SessionCuts::Made& one : cuts) {
-    bytes += one->memory.bytes();
-  }
+  const uint64_t bytes = dropped.bytes + given_up.memory.bytes();
   given_up.mesher = nullptr;  // before others may have its memory
-  earlier = {};
-  located.clear();
-  cuts.clear();
-  deltas.clear();
   given_up.memory.Release();
   return bytes;
 }

@@ -26,14 +26,12 @@
 #include "server/jobs/job.h"
 #include "server/jobs/memory_budget.h"
 #include "server/sessions/answer_to.h"
-#include "server/sessions/mesh_cut.h"
-#include "server/sessions/mesh_deltas.h"
 #include "server/sessions/occupancy.h"
 #include "server/sessions/operation.h"
 #include "server/sessions/point_account.h"
 #include "server/sessions/session_changes.h"
 #include "server/sessions/session_inputs.h"
-#include "server/sessions/session_locator.h"
+#include "server/sessions/session_meshes.h"
 #include "server/sessions/session_state.h"
 #include "server/sessions/session_work.h"
 #include "server/store/mesh_snapshot.h"
@@ -57,8 +55,8 @@ struct PointsLeft {
 };
 
 // A session in the process that has it: its state, which is a value (session_state.h), and the process's own data
-// beside it: stores of points, features and sizes, the mesher, the last mesh, live operations, and who is at work
-// (occupancy.h).
+// beside it: stores of points, features and sizes, the mesher, the meshes and their products (session_meshes.h), live
+// operations, and who is at work (occupancy.h).
 //
 // A change is made by a pure function of the state and of the request (session_changes.h); Make applies it, has
 // the log commit it, and shows the state after it. Functions are in several files:
@@ -67,7 +65,7 @@ struct PointsLeft {
 //   session_points.cc      uploads                           session_features.cc    features
 //   session_removal.cc     points that are taken out         session_operations.cc  operations
 //   session_sizes.cc       sizes at points                   session_structure.cc   the mesher that is built again,
-//                                                            vertices that are added, the locator, cuts
+//                                                            vertices that are added
 //
 // States, and their changes: docs/design/sessions.md, "States".
 //
@@ -193,17 +191,11 @@ class Session {
   absl::Status SetSizes(const std::shared_ptr<const core::SizeSamples>& samples, uint64_t expected_revision,
                         MemoryReservation* received = nullptr);
 
-  // ---- Mesh and queries, and memory that is given up for other work: session.cc ----
+  // ---- Meshes and queries, and memory that is given up for other work: session.cc ----
 
-  // The last mesh; null before the first.
-  std::shared_ptr<const MeshSnapshot> mesh() const;
-  // The mesh of `revision`: the last one, or the one before it that was downloaded, or located points in, last. That is
-  // kept while memory allows it.
-  //
-  // Errors:     MESH_NOT_READY, MESH_NOT_KEPT, naming those that are, SESSION_NOT_FOUND.
-  absl::StatusOr<std::shared_ptr<const MeshSnapshot>> KeptMesh(uint64_t revision) const;
-  // The differences that are known between the last mesh and those before.
-  MeshDeltas& deltas() const { return deltas_; }
+  // Its last mesh, the one before, and their products. Questions about them end with MESH_NOT_READY or
+  // SESSION_NOT_FOUND where there is none.
+  SessionMeshes& meshes() const { return meshes_; }
   // Runs `query` on this thread, a worker's. Any number of queries run at once. An operation that begins waits for the
   // queries that run: keep each short (some milliseconds), and call this again for the next batch.
   // `version` is the structure's: 0 for the first batch, which sets it; later batches leave it as it was set.
@@ -214,7 +206,7 @@ class Session {
 
   // The memory that the session can give up for other work.
   struct Spare {
-    uint64_t bytes = 0;                              // that GiveUpMesher frees
+    uint64_t bytes = 0;                              // that GiveUpMemory frees
     absl::Duration last_use = absl::ZeroDuration();  // since boot
   };
   // Nothing of a session that is busy, or whose structure is in use, or which ends with the process, but an earlier
@@ -223,14 +215,14 @@ class Session {
   // To be called, without a lock, where the session was busy, or its structure, its locator or a cut in use: it may be
   // spared.
   void NoteIdle() const;
-  // Gives the mesher up for other work, the locators, cuts, the differences of meshes, and an earlier mesh that is in
-  // memory. All but the last two come back as PrepareStructure, PrepareLocator, PrepareCut and operations say. Returns
-  // how much memory that has freed: 0, and nothing is done, where there is nothing to spare.
+  // Gives up, for other work, the mesher and all that SessionMeshes::GiveUp does. The mesher comes back as
+  // PrepareStructure and operations say. Returns how much memory that has freed: 0, and nothing is done, where there is
+  // nothing to spare.
   //
   // Complexity: that of freeing the mesher, on this thread, without a lock.
-  uint64_t GiveUpMesher();
+  uint64_t GiveUpMemory();
 
-  // ---- The structure, vertices that are added, the locator, and cuts: session_structure.cc ----
+  // ---- The structure, and vertices that are added: session_structure.cc ----
 
   // Makes sure that the session has a structure for queries and additions. Where the mesher was given up, `job` builds
   // it again, on this thread, a worker's. `*is_at_work`: another job builds it now, and the status is SESSION_BUSY.
@@ -251,25 +243,6 @@ class Session {
   absl::StatusOr<AddedVertices> AddVertices(std::span<const double> points, std::span<const uint32_t> near,
                                             uint64_t expected_revision, core::RunContext& context,
                                             const AnswerTo<AddedVertices>& answer = nullptr);
-
-  // The session's mesh of `revision`, as KeptMesh has it, for points to be located in: the kept one, or made by `job`.
-  // 0: the last one.
-  //
-  // Errors:     MESH_NOT_READY, REVISION_MISMATCH, SESSION_NOT_FOUND; those of MakeLocated.
-  absl::StatusOr<std::shared_ptr<const LocatedMesh>> PrepareLocator(uint64_t revision, Job& job);
-  // Whether PrepareLocator makes none.
-  bool HasLocator(uint64_t revision) const;
-
-  // The cut of `mesh`, a mesh of the session: the kept one, or made by `job`. `*is_at_work`: another job makes one
-  // now, and the cut is null; to be tried again.
-  //
-  // Errors:     SESSION_NOT_FOUND; those of CutIntoParts.
-  absl::StatusOr<std::shared_ptr<const MeshCut>> PrepareCut(const std::shared_ptr<const MeshSnapshot>& mesh,
-                                                            const core::PartitionOptions& options, Job& job,
-                                                            bool* is_at_work);
-  // Whether PrepareCut would return a kept cut, and whether another job makes one now.
-  bool HasCut(const MeshSnapshot& mesh, const core::PartitionOptions& options) const;
-  bool IsCutting() const { return cuts_.IsMaking(); }
 
   // The size of the inputs that there are to work on.
   struct Size {
@@ -382,17 +355,10 @@ class Session {
   // Errors:     SESSION_NOT_FOUND, DATA_LOSS.
   absl::Status LoadInputs() ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_) ABSL_LOCKS_EXCLUDED(mutex_);
 
-  // The last mesh is about to be replaced. It is kept as earlier_mesh_ if clients have it; what is not kept any more is
-  // handed over, to be freed without a lock.
-  struct Retired {
-    std::vector<SessionLocator::Made> located;
-    std::shared_ptr<MeshSnapshot> mesh;
-  };
-  Retired RetireMesh() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  // Its memory is other work's, if that wants it.
-  void YieldEarlierMesh() ABSL_LOCKS_EXCLUDED(mutex_);
-  // The bytes of the earlier mesh and its locator that other work can have.
-  uint64_t SpareEarlierBytes() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // Whether clients may ask for meshes.
+  //
+  // Errors:     MESH_NOT_READY, SESSION_NOT_FOUND.
+  absl::Status CheckHasMesh() const ABSL_LOCKS_EXCLUDED(mutex_);
 
   // Of a session that was deleted: the points file that has only uncommitted points goes, too.
   void DropUnnamed() ABSL_LOCKS_EXCLUDED(mutex_);
@@ -413,20 +379,14 @@ class Session {
   // guards all that others see; it is never held over meshing, or over a commit.
   mutable absl::Mutex change_mutex_ ABSL_ACQUIRED_BEFORE(mutex_);
   mutable absl::Mutex mutex_;
-  // These have locks of their own. No thread holds change_mutex_ and wants one of the first three.
-  SessionLocator locator_;          // of the last mesh
-  SessionLocator earlier_locator_;  // of earlier_mesh_
-  SessionCuts cuts_{kMostCuts};
-  mutable MeshDeltas deltas_;
+  mutable SessionMeshes meshes_;  // has a lock of its own, after these
 
   // Never null; written with both locks held, by Make alone.
   std::shared_ptr<const SessionState> state_ ABSL_GUARDED_BY(mutex_);
   mutable Occupancy occupancy_ ABSL_GUARDED_BY(mutex_);  // queries come and go
   PointAccount account_ ABSL_GUARDED_BY(mutex_);         // of points and bytes, vertices that are being added included
-  Stores stores_ ABSL_GUARDED_BY(mutex_);  // the work that has made the session busy reads them by inputs()
-  // A mesh before the last one, for clients that have it; null: none.
-  std::shared_ptr<MeshSnapshot> earlier_mesh_ ABSL_GUARDED_BY(mutex_);
-  SessionWork work_ ABSL_GUARDED_BY(mutex_);  // its mesher is away while work has the session
+  Stores stores_ ABSL_GUARDED_BY(mutex_);     // the work that has made the session busy reads them by inputs()
+  SessionWork work_ ABSL_GUARDED_BY(mutex_);  // its mesher is away while work has the session; without mesh
   std::deque<std::shared_ptr<Operation>> operations_ ABSL_GUARDED_BY(mutex_);  // those of the state, alive
 };
 

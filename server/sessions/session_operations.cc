@@ -136,7 +136,9 @@ std::optional<SessionWork> Session::BeginWork(Operation& operation) {
   }
   absl::MutexLock lock(&mutex_);
   mutex_.Await(absl::Condition(HasNoQueries, &occupancy_));
-  return work_.TakeMesher();
+  SessionWork work = work_.TakeMesher();
+  work.mesh = meshes_.last();
+  return work;
 }
 
 absl::Status Session::CommitSuccess(Operation& operation, WorkResult& result) {
@@ -144,15 +146,13 @@ absl::Status Session::CommitSuccess(Operation& operation, WorkResult& result) {
   uint64_t bytes_before = 0;
   {
     absl::MutexLock lock(&mutex_);
-    bytes_before = work_.mesh == nullptr ? 0 : work_.mesh->loaded_bytes();
+    const std::shared_ptr<const MeshSnapshot> before = meshes_.last();
+    bytes_before = before == nullptr ? 0 : before->loaded_bytes();
     WELLSPACE_RETURN_IF_ERROR(account_.TakeMesh(bytes));
   }
-  // Dropped differences, sizes and meshes are freed without the lock, and products of the mesh before.
-  std::vector<MeshDeltas::Delta> deltas;
-  std::vector<SessionLocator::Made> located;
-  std::vector<SessionCuts::Made> cuts;
+  // Freed without the lock.
   SizeSets sizes;
-  Retired retired;
+  SessionMeshes::Dropped dropped;
   SessionChange change;
   const auto show = [&] {
     mutex_.AssertHeld();
@@ -162,17 +162,10 @@ absl::Status Session::CommitSuccess(Operation& operation, WorkResult& result) {
       account_.ReturnSizes(set.mapped()->sizes.size());
       sizes.insert(std::move(set));
     }
-    if (work_.mesh != nullptr) {
-      work_.mesh->MakeObsolete();
-      retired = RetireMesh();
-    }
     if (occupancy_.is_closed) {
       result.mesh->MakeObsolete();
     }
-    deltas = deltas_.Advance(std::move(result.delta), bytes);
-    located = locator_.Drop();
-    cuts = cuts_.Drop();
-    result.work.mesh = std::move(result.mesh);
+    dropped = meshes_.Replace(std::move(result.mesh), std::move(result.delta), state_->epoch);
     std::swap(work_, result.work);
     (void)operation.Apply(RecordOfOperation(*state_, operation.number()));
     occupancy_.EndBusy(clock_.since_boot());
@@ -192,6 +185,7 @@ absl::Status Session::CommitSuccess(Operation& operation, WorkResult& result) {
 }
 
 bool Session::EndWork(Operation& operation, WorkResult& result) {
+  result.work.mesh = nullptr;  // the session alone has an earlier mesh, so that it can be given up
   {
     absl::MutexLock change_lock(&change_mutex_);
     if (result.status.ok()) {
@@ -222,35 +216,10 @@ bool Session::EndWork(Operation& operation, WorkResult& result) {
       occupancy_.EndBusy(clock_.since_boot());
     }
   }
-  result.work.mesh = nullptr;  // the session alone has an earlier mesh, so that it can be given up
-  YieldEarlierMesh();
+  meshes_.YieldEarlier();
   operation.Notify();
   NoteIdle();
   return true;
-}
-
-void Session::YieldEarlierMesh() {
-  std::shared_ptr<MeshSnapshot> earlier;
-  {
-    absl::MutexLock lock(&mutex_);
-    earlier = earlier_mesh_;
-  }
-  if (earlier != nullptr) {
-    earlier->YieldMemory();
-  }
-}
-
-Session::Retired Session::RetireMesh() {
-  const uint64_t revision = work_.mesh->revision();
-  if (!deltas_.WasDownloaded(revision) && !locator_.WasAskedFor(revision) && !cuts_.WasAskedFor(revision)) {
-    return {.located = {}, .mesh = nullptr};  // no client has values on it; they may on the one before
-  }
-  const uint64_t epoch = work_.mesh->record().epoch();
-  if (epoch != 0 && epoch != state_->epoch) {
-    // Another owner has made the file, and no record names it any more: it may go when the folder is cleared up.
-    return {.located = {}, .mesh = nullptr};
-  }
-  return {.located = earlier_locator_.Replace(locator_.Drop()), .mesh = std::exchange(earlier_mesh_, work_.mesh)};
 }
 
 absl::StatusOr<std::shared_ptr<Job>> Session::Cancel(Operation& operation) {

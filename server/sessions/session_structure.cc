@@ -13,13 +13,6 @@
 namespace wellspace::server {
 namespace {
 
-// Whether a cut is one with these options.
-auto IsCutWith(const core::PartitionOptions& options) {
-  return [&options](const MeshCut& cut) {
-    return cut.options.parts == options.parts && cut.options.contiguous == options.contiguous;
-  };
-}
-
 // Reserves memory for `count` more vertices in the mesher of `work`.
 absl::Status ReserveForVertices(uint64_t count, MemoryBudget& memory, SessionWork& work) {
   if (!memory.is_limited()) {
@@ -63,7 +56,7 @@ absl::Status Session::PrepareStructure(uint64_t expected_revision, const MesherF
       return absl::OkStatus();
     }
     occupancy_.BeginBusy(Busy::kReplaying);
-    last_mesh = work_.mesh;
+    last_mesh = meshes_.last();
   }
   SessionWork built;
   const absl::Status status = RunGuarded([&] {
@@ -100,64 +93,6 @@ Session::Size Session::GetSize(uint64_t few) const {
     size.replayed_steps = !is_theirs && work_.mesher == nullptr ? state_->steps.count() : 0;
   }
   return size;
-}
-
-absl::StatusOr<std::shared_ptr<const LocatedMesh>> Session::PrepareLocator(uint64_t revision, Job& job) {
-  absl::StatusOr<std::shared_ptr<const MeshSnapshot>> earlier = nullptr;
-  {
-    absl::MutexLock lock(&mutex_);
-    if (!occupancy_.is_closed && earlier_mesh_ != nullptr && earlier_mesh_->revision() == revision) {
-      earlier = earlier_mesh_;
-    }
-  }
-  const Lasts lasts = inputs().lasts;
-  const auto make = [&](const MeshSnapshot& found) { return MakeLocated(found, lasts, job); };
-  if (*earlier != nullptr) {
-    return earlier_locator_.Prepare([&] { return earlier; }, make);
-  }
-  const auto mesh = [&]() -> absl::StatusOr<std::shared_ptr<const MeshSnapshot>> {
-    absl::MutexLock lock(&mutex_);
-    WELLSPACE_RETURN_IF_ERROR(CheckOpen(occupancy_, name()));
-    WELLSPACE_RETURN_IF_ERROR(CheckMesh(*state_));
-    if (revision != 0 && earlier_mesh_ != nullptr && revision == earlier_mesh_->revision()) {
-      return earlier_mesh_;  // it was the last one before the wait
-    }
-    if (revision != 0 && revision != work_.mesh->revision()) {
-      const std::string kept =
-          earlier_mesh_ == nullptr ? "" : absl::StrCat(", and the one that is kept, of ", earlier_mesh_->revision());
-      return MakeError(v1::ERROR_REASON_REVISION_MISMATCH,
-                       absl::StrCat("revision is ", revision, ", but the mesh of ", name(), " is of revision ",
-                                    work_.mesh->revision(), kept),
-                       "revision");
-    }
-    return work_.mesh;
-  };
-  return locator_.Prepare(mesh, make);
-}
-
-absl::StatusOr<std::shared_ptr<const MeshCut>> Session::PrepareCut(const std::shared_ptr<const MeshSnapshot>& mesh,
-                                                                   const core::PartitionOptions& options, Job& job,
-                                                                   bool* is_at_work) {
-  const auto find = [&]() -> absl::StatusOr<std::shared_ptr<const MeshSnapshot>> {
-    absl::MutexLock lock(&mutex_);
-    WELLSPACE_RETURN_IF_ERROR(CheckOpen(occupancy_, name()));
-    return mesh;
-  };
-  const Lasts lasts = inputs().lasts;
-  return cuts_.Prepare(
-      find, [&](const MeshSnapshot& found) { return CutIntoParts(found, options, lasts, job); }, IsCutWith(options),
-      is_at_work);
-}
-
-bool Session::HasCut(const MeshSnapshot& mesh, const core::PartitionOptions& options) const {
-  return cuts_.Find(mesh.revision(), IsCutWith(options)) != nullptr;
-}
-
-bool Session::HasLocator(uint64_t revision) const {
-  absl::MutexLock lock(&mutex_);
-  const uint64_t last = work_.mesh == nullptr ? 0 : work_.mesh->revision();
-  return last != 0 &&
-         (locator_.Find(revision == 0 ? last : revision) != nullptr || earlier_locator_.Find(revision) != nullptr);
 }
 
 // One AddVertices: its parts, in their order.

@@ -19,10 +19,9 @@ struct SessionWork {
   // Of the session's points it has, or would have if it was not given up, those of the steps. Null: there is none yet,
   // or it was given up.
   std::unique_ptr<core::Mesher> mesher;
-  std::shared_ptr<MeshSnapshot> mesh;  // the last mesh; null before the first
+  std::shared_ptr<MeshSnapshot> mesh;  // the last mesh, for an operation; null before the first
 
-  // Leaves the mesh alone here.
-  SessionWork TakeMesher() { return {.memory = std::move(memory), .mesher = std::move(mesher), .mesh = mesh}; }
+  SessionWork TakeMesher() { return {.memory = std::move(memory), .mesher = std::move(mesher), .mesh = nullptr}; }
 };
 
 // The result of an operation's work.

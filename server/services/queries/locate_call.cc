@@ -82,7 +82,7 @@ absl::Status LocateCall::Submit() {
   WELLSPACE_RETURN_IF_ERROR(CheckFinite(points_, dimension, offset_));
   WELLSPACE_ASSIGN_OR_RETURN(revision_, RevisionFromProto(request_->has_revision(), request_->revision(), "revision"));
   allow_outside_ = request_->allow_outside();
-  const bool is_small = session->HasLocator(revision_);
+  const bool is_small = session->meshes().HasLocator(revision_);
   use_.emplace(std::move(session));
   WELLSPACE_ASSIGN_OR_RETURN(
       job_, environment().jobs.Submit({.tenant = caller().tenant,
@@ -97,7 +97,7 @@ void LocateCall::Locate(Job& job) {
   uint64_t vertices = 0;
   absl::Status status = RunGuarded([&] {
     WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<const LocatedMesh> mesh,
-                               use_->session().PrepareLocator(revision_, job));
+                               use_->session().meshes().PrepareLocator(revision_, job));
     WELLSPACE_ASSIGN_OR_RETURN(located, mesh->locator->Locate(points_, job.context()));
     revision = mesh->revision;
     vertices = mesh->vertices;

@@ -88,8 +88,8 @@ absl::Status TransferValuesCall::TakeStart(const v1::TransferValuesRequest::Star
                                 session->dimension(), "-D"),
                    "start.conservative");
   }
-  WELLSPACE_ASSIGN_OR_RETURN(from_, session->KeptMesh(from));
-  onto_ = session->mesh();
+  WELLSPACE_ASSIGN_OR_RETURN(from_, session->meshes().Kept(from));
+  onto_ = session->meshes().last();
   if (revision != 0 && revision != onto_->revision()) {
     return MakeError(v1::ERROR_REASON_REVISION_MISMATCH,
                      absl::StrCat("start.revision is ", revision, ", but the mesh of ", session->name(),

@@ -58,7 +58,7 @@ absl::Status DownloadMeshCall::Find() {
   WELLSPACE_RETURN_IF_ERROR(ParseRequest(&bytes_, &request_));
   WELLSPACE_RETURN_IF_ERROR(CheckRequest());
   WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Session> session, FindSession(environment(), caller(), request_.name()));
-  std::shared_ptr<const MeshSnapshot> mesh = session->mesh();
+  std::shared_ptr<const MeshSnapshot> mesh = session->meshes().last();
   if (mesh == nullptr) {
     return MakeError(v1::ERROR_REASON_MESH_NOT_READY,
                      absl::StrCat(session->name(), " has no mesh yet; refine it first"));
@@ -78,7 +78,7 @@ absl::Status DownloadMeshCall::Find() {
   WELLSPACE_RETURN_IF_ERROR(BeginPart());
   WELLSPACE_RETURN_IF_ERROR(CheckNextChunk());
   // The client has it, or differences that lead to it, from now on: those of later meshes from it are of use.
-  session->deltas().NoteDownload(mesh_->revision());
+  session->meshes().deltas().NoteDownload(mesh_->revision());
   use_.emplace(std::move(session));
   return absl::OkStatus();
 }
@@ -88,9 +88,9 @@ core::PartitionOptions DownloadMeshCall::Partition() const {
 }
 
 void DownloadMeshCall::WantPart() {
-  Session& session = use_->session();
-  const bool is_cut = session.HasCut(*mesh_, Partition());
-  if (!is_cut && session.IsCutting()) {
+  const SessionMeshes& meshes = use_->session().meshes();
+  const bool is_cut = meshes.HasCut(*mesh_, Partition());
+  if (!is_cut && meshes.IsCutting()) {
     TryLater();
     return;
   }
@@ -126,7 +126,7 @@ void DownloadMeshCall::TakePartIn(Job& job) {
   bool is_at_work = false;
   absl::Status status = RunGuarded([&] {
     WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<const MeshCut> cut,
-                               use_->session().PrepareCut(mesh_, Partition(), job, &is_at_work));
+                               use_->session().meshes().PrepareCut(mesh_, Partition(), job, &is_at_work));
     if (!is_at_work) {
       WELLSPACE_ASSIGN_OR_RETURN(part, TakePart(*cut, *mesh_, wanted, job));
     }
@@ -165,7 +165,7 @@ absl::Status DownloadMeshCall::FindDeltas(const Session& session) {
                      session.name(), ", the last of which is of revision ", mesh_->revision()),
         "since_revision");
   }
-  WELLSPACE_ASSIGN_OR_RETURN(deltas_, session.deltas().Between(request_.since_revision(), mesh_->revision()));
+  WELLSPACE_ASSIGN_OR_RETURN(deltas_, session.meshes().deltas().Between(request_.since_revision(), mesh_->revision()));
   return absl::OkStatus();
 }
 

@@ -119,7 +119,7 @@ absl::Status SetSizesCall::Set(SizeStore sizes, bool of_vertices) {
 
 absl::Status SetSizesCall::FindPoints(SizeStore& sizes) {
   const Session& session = session_->session();
-  const std::shared_ptr<const MeshSnapshot> mesh = session.mesh();
+  const std::shared_ptr<const MeshSnapshot> mesh = session.meshes().last();
   if (mesh == nullptr) {
     return MakeError(v1::ERROR_REASON_MESH_NOT_READY,
                      absl::StrCat(session.name(), " has no mesh yet, and so no vertices; send samples with points"));

@@ -170,13 +170,13 @@ TEST_F(IdleSessionsTest, TheOneThatWasNotUsedForLongestGivesUp) {
   EXPECT_TRUE(HasStructure(*third));
   EXPECT_EQ(counters_.structures_given_up, 1u);
   EXPECT_EQ(second->Describe().state(), v1::Session::STATE_READY) << "it is as it was";
-  EXPECT_NE(second->mesh(), nullptr);
+  EXPECT_NE(second->meshes().last(), nullptr);
   EXPECT_EQ(second->GetSize(0).replayed_steps, 1u);
 }
 
 TEST_F(IdleSessionsTest, WhoStartsAnOperationSeesWhatIsReplayedFirst) {
   const std::shared_ptr<Session> session = Refined();
-  EXPECT_GT(session->GiveUpMesher(), 0u);
+  EXPECT_GT(session->GiveUpMemory(), 0u);
   uint64_t replayed_steps = 0;
   const auto submit = [&](const std::shared_ptr<Operation>&) {
     replayed_steps = session->GetSize(0).replayed_steps;
@@ -221,23 +221,23 @@ TEST_F(IdleSessionsTest, OneThatAnswersAQueryIsLeftAlone) {
   ASSERT_TRUE(session
                   ->Query(&version,
                           [&](const core::Mesher&) {
-                            EXPECT_EQ(session->GiveUpMesher(), 0u);
+                            EXPECT_EQ(session->GiveUpMemory(), 0u);
                             return absl::OkStatus();
                           })
                   .ok());
-  EXPECT_EQ(session->GiveUpMesher(), kStructure);
-  EXPECT_EQ(session->GiveUpMesher(), 0u) << "there is nothing any more";
+  EXPECT_EQ(session->GiveUpMemory(), kStructure);
+  EXPECT_EQ(session->GiveUpMemory(), 0u) << "there is nothing any more";
 }
 
 TEST_F(IdleSessionsTest, DifferencesOfMeshesAreGivenUpToo) {
   const std::shared_ptr<Session> session = Refined();
   const auto delta = std::make_shared<DeltaSnapshot>(2, 3, core::MeshDelta{.dimension = 2}, MakeMesh({.dimension = 2}));
-  (void)session->deltas().Advance(delta, kStructure);
-  const uint64_t bytes = session->deltas().memory_bytes();
+  (void)session->meshes().deltas().Advance(delta, kStructure);
+  const uint64_t bytes = session->meshes().deltas().memory_bytes();
   EXPECT_GT(bytes, 0u);
   EXPECT_EQ(session->GetSpare()->bytes, kStructure + bytes);
-  EXPECT_EQ(session->GiveUpMesher(), kStructure + bytes);
-  EXPECT_EQ(session->deltas().memory_bytes(), 0u);
+  EXPECT_EQ(session->GiveUpMemory(), kStructure + bytes);
+  EXPECT_EQ(session->meshes().deltas().memory_bytes(), 0u);
   EXPECT_FALSE(session->GetSpare().has_value());
 }
 
@@ -253,7 +253,7 @@ TEST_F(EphemeralIdleSessionsTest, NeverGiveUp) {
   EXPECT_FALSE(memory_.CanMakeRoom());
   EXPECT_FALSE(memory_.MakeRoom(90 * kMegabyte, Want::kAsMuchAsPossible));
   EXPECT_TRUE(HasStructure(*session));
-  EXPECT_EQ(session->GiveUpMesher(), 0u);
+  EXPECT_EQ(session->GiveUpMemory(), 0u);
 }
 
 }  // namespace

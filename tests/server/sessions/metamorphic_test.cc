@@ -172,7 +172,7 @@ class Living {
       }
     }
     Disturb();
-    return HashOf(*session_->mesh());
+    return HashOf(*session_->meshes().last());
   }
 
   const std::string& what() const { return what_; }
@@ -217,7 +217,7 @@ class Living {
     }
     if (Draw(3)) {
       what_ += " give-up";
-      (void)session_->GiveUpMesher();  // nothing, where it has none
+      (void)session_->GiveUpMemory();  // nothing, where it has none
     }
     if (has_structure_ && Draw(4)) {
       what_ += " query";

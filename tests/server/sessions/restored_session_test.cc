@@ -198,8 +198,8 @@ TEST_F(RestoredSessionTest, PointsAreCommittedWhileVerticesAreAdded) {
   });
   ASSERT_TRUE(session_->Append(0, std::vector<double>{0, 0, 1, 0}, 0).ok());
   Refine();
-  const std::vector<double> inside = {session_->mesh()->record().domain_low()[0],
-                                      session_->mesh()->record().domain_low()[1]};
+  const std::vector<double> inside = {session_->meshes().last()->record().domain_low()[0],
+                                      session_->meshes().last()->record().domain_low()[1]};
   ASSERT_TRUE(session_->Append(2, inside, 0).ok());
   is_adding = true;
   absl::StatusOr<AddedVertices> added;
@@ -228,7 +228,7 @@ TEST_F(RestoredSessionTest, ASessionWhoseExpiryWasNotWrittenDownIsWhole) {
   since_boot_ += absl::Hours(1);
   EXPECT_EQ(registry_->RemoveExpired().size(), 1u);
   StartProcess();
-  EXPECT_TRUE(session_->mesh()->Metadata(true).ok()) << session_->mesh()->Metadata(true).status();
+  EXPECT_TRUE(session_->meshes().last()->Metadata(true).ok()) << session_->meshes().last()->Metadata(true).status();
 }
 
 TEST_F(RestoredSessionTest, AnOperationTakesAllPointsThatWereAppended) {
