@@ -11,6 +11,7 @@ using client::CriterionName;
 using client::CrossingRuleName;
 using client::ErrorJson;
 using client::FaceRuleName;
+using client::HealthName;
 using client::Json;
 using client::JsonText;
 using client::OperationJson;

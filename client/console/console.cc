@@ -4,6 +4,11 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -12,8 +17,10 @@
 #include "client/console/mesh_upload.h"
 #include "client/console/parameter_form.h"
 #include "client/files/mesh_file.h"
+#include "client/formats/io/input_file.h"
 #include "client/formats/io/output_file.h"
 #include "client/formats/io/temporary_folder.h"
+#include "client/formats/io/zip_file.h"
 #include "client/formats/read_mesh.h"
 #include "client/formats/write_mesh.h"
 #include "client/json/statistics.h"
@@ -32,8 +39,9 @@ using client::Json;
 
 constexpr char kSessions[] = "sessions/";
 constexpr char kApi[] = "api/";
-constexpr size_t kMostSessions = 500;  // that the page lists
-constexpr size_t kMostTimes = 1000;    // operations whose time is kept
+constexpr size_t kMostSessions = 500;    // that the page lists
+constexpr size_t kMostTimes = 1000;      // operations whose time is kept
+constexpr size_t kPieceBytes = 1 << 20;  // of a file that goes into an archive
 constexpr char kHtml[] = "text/html; charset=utf-8";
 
 int StatusOf(const absl::Status& status) {
@@ -73,17 +81,6 @@ absl::Status NoSuchPath(const HttpRequest& request) {
   return absl::NotFoundError(absl::StrCat("the console knows no ", request.method, " of this path"));
 }
 
-// Formats of one file each, by which a mesh can be downloaded.
-std::vector<std::string> SingleFileFormats() {
-  std::vector<std::string> formats;
-  for (const std::string& format : formats::MeshFormats()) {
-    if (formats::FilesOfMeshWritten("mesh" + formats::ExtensionOfMesh(format), format).size() == 1) {
-      formats.push_back(format);
-    }
-  }
-  return formats;
-}
-
 // Ends a download with the header: nothing else is wanted of the mesh.
 class HeaderSink final : public client::MeshSink {
  public:
@@ -114,6 +111,39 @@ absl::StatusOr<std::string> NewFile(const std::string& folder) {
   return path;
 }
 
+// Puts all files of a folder into the archive `path`, by their names.
+absl::Status WriteArchive(const std::string& folder, const std::string& path, const std::stop_token& stop) {
+  std::vector<std::filesystem::path> files;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+    files.push_back(entry.path());
+  }
+  if (error) {
+    return absl::InternalError(absl::StrCat("the files of the mesh cannot be listed: ", error.message()));
+  }
+  std::sort(files.begin(), files.end());
+  WELLSPACE_ASSIGN_OR_RETURN(formats::OutputFile output, formats::OutputFile::Create(path, stop));
+  formats::ZipWriter archive(output);
+  std::string piece;
+  for (const std::filesystem::path& name : files) {
+    WELLSPACE_ASSIGN_OR_RETURN(formats::InputFile file, formats::InputFile::Open(name.string()));
+    archive.Begin(name.filename().string(), file.size().value_or(0));
+    for (size_t got = 1; got > 0 && archive.status().ok();) {
+      piece.resize(kPieceBytes);
+      WELLSPACE_ASSIGN_OR_RETURN(got, file.Read(piece.data(), piece.size()));
+      archive.Write(std::string_view(piece).substr(0, got));
+    }
+  }
+  WELLSPACE_RETURN_IF_ERROR(archive.Finish());
+  return output.Commit();
+}
+
+HttpAnswer FileAnswer(const std::string& path, const std::string& name) {
+  return {.type = "application/octet-stream",
+          .file = path,
+          .headers = {{"Content-Disposition", absl::StrCat("attachment; filename=\"", SafeFileName(name), "\"")}}};
+}
+
 }  // namespace
 
 Console::Console(client::Client client, ConsoleOptions options)
@@ -125,6 +155,14 @@ client::CallOptions Console::Call() const {
   client::CallOptions call;
   call.timeout = kPatience;
   call.stop = options_.stop;
+  return call;
+}
+
+client::CallOptions Console::Look() const {
+  // A server that is gone is told soon, and asked again by the page.
+  constexpr absl::Duration kPatience = absl::Seconds(5);
+  client::CallOptions call = Call();
+  call.timeout = kPatience;
   return call;
 }
 
@@ -189,15 +227,31 @@ absl::StatusOr<HttpAnswer> Console::AnswerOfSession(const HttpRequest& request, 
 }
 
 absl::StatusOr<Json> Console::ServerFigures() {
-  WELLSPACE_ASSIGN_OR_RETURN(const client::ServerInfo info, client_.GetServerInfo(Call()));
+  WELLSPACE_ASSIGN_OR_RETURN(const client::ServerInfo info, client_.GetServerInfo(Look()));
+  WELLSPACE_ASSIGN_OR_RETURN(const client::Health health, client_.CheckHealth("", Look()));
   return Json{{"server", options_.server.empty() ? Json(nullptr) : Json(options_.server)},
               {"info", client::ServerInfoJson(info)},
-              {"formats", SingleFileFormats()}};
+              {"health", client::HealthName(health)},
+              {"formats", FormatsByDimension(info.dimensions)}};
+}
+
+Json Console::FormatsByDimension(std::span<const int> dimensions) const {
+  Json found = Json::object();
+  for (const int dimension : dimensions) {
+    Json& names = found[absl::StrCat(dimension)] = Json::array();
+    for (const std::string& format : formats::MeshFormats()) {
+      const std::string path = absl::StrCat(options_.folder, "/mesh", formats::ExtensionOfMesh(format));
+      if (formats::CheckMeshOutput(path, format, dimension).ok()) {
+        names.push_back(format);
+      }
+    }
+  }
+  return found;
 }
 
 absl::StatusOr<Json> Console::Sessions() {
   WELLSPACE_ASSIGN_OR_RETURN(const client::Overview overview,
-                             client::GetOverview(client_, {.most = kMostSessions}, Call()));
+                             client::GetOverview(client_, {.most = kMostSessions}, Look()));
   Json sessions = Json::array();
   for (const client::SessionWithOperation& one : overview.sessions) {
     Json& entry = sessions.emplace_back();
@@ -282,19 +336,30 @@ absl::StatusOr<HttpAnswer> Console::View(const std::string& session) {
 }
 
 absl::StatusOr<HttpAnswer> Console::Mesh(const std::string& session, const std::string& format) {
-  const std::vector<std::string> formats = SingleFileFormats();
+  const std::vector<std::string> formats = formats::MeshFormats();
   if (std::find(formats.begin(), formats.end(), format) == formats.end()) {
     return absl::InvalidArgumentError("format: expected the name of one that is listed");
   }
-  WELLSPACE_ASSIGN_OR_RETURN(const std::string reserved, NewFile(options_.folder));
-  const std::string path = reserved + formats::ExtensionOfMesh(format);
-  unlink(reserved.c_str());
-  client::MeshFile file(path, format, options_.stop);
-  WELLSPACE_RETURN_IF_ERROR(client_.DownloadMesh(session, file, std::nullopt, nullptr, Call()));
-  const std::string name = SafeFileName(absl::StrCat("mesh", formats::ExtensionOfMesh(format)));
-  return HttpAnswer{.type = "application/octet-stream",
-                    .file = path,
-                    .headers = {{"Content-Disposition", absl::StrCat("attachment; filename=\"", name, "\"")}}};
+  // Files that name each other do so by these names.
+  WELLSPACE_ASSIGN_OR_RETURN(const formats::TemporaryFolder folder, formats::TemporaryFolder::Make());
+  const std::string name = absl::StrCat("mesh", formats::ExtensionOfMesh(format));
+  const std::string made = absl::StrCat(folder.path(), "/", name);
+  client::MeshFile file(made, format, options_.stop);
+  if (const absl::Status status = client_.DownloadMesh(session, file, std::nullopt, nullptr, Call()); !status.ok()) {
+    return WithoutFolder(status, folder);
+  }
+  const bool is_alone = formats::FilesOfMeshWritten(made, format).size() == 1;
+  WELLSPACE_ASSIGN_OR_RETURN(const std::string path, NewFile(options_.folder));
+  const std::string extended = path + (is_alone ? formats::ExtensionOfMesh(format) : ".zip");
+  unlink(path.c_str());
+  if (!is_alone) {
+    WELLSPACE_RETURN_IF_ERROR(WriteArchive(folder.path(), extended, options_.stop));
+    return FileAnswer(extended, absl::StrCat(name, ".zip"));
+  }
+  if (std::rename(made.c_str(), extended.c_str()) != 0) {
+    return absl::InternalError(absl::StrCat("the mesh cannot be moved: ", std::strerror(errno)));
+  }
+  return FileAnswer(extended, name);
 }
 
 }  // namespace wellspace::console

@@ -5,6 +5,7 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <stop_token>
 #include <string>
 #include <string_view>
@@ -28,7 +29,7 @@ struct ConsoleOptions {
 // Paths, under the prefix of the guard:
 //
 //   GET                                      the page
-//   GET    api/server                        {info, health, server, formats}; figures of the server
+//   GET    api/server                        {info, health, server, formats: {DIMENSION: [format]}}
 //   GET    api/form                          see ParameterForm
 //   GET    api/sessions                      {sessions: [{session, operation, seconds_left}], more}
 //   POST   api/sessions?name=&parameters=&crossings=    the body is a file; {operation, notes}
@@ -37,7 +38,7 @@ struct ConsoleOptions {
 //   DELETE api/sessions/ID
 //   GET    api/sessions/ID/statistics        see StatisticsJson
 //   GET    sessions/ID/view                  the page of its mesh, see client/viewer
-//   GET    sessions/ID/mesh?format=          its mesh, a file
+//   GET    sessions/ID/mesh?format=          its mesh; of a format of several files an archive of them, a .zip
 //
 // An error is {code, reason, field, message}, as ErrorJson has it.
 //
@@ -59,8 +60,10 @@ class Console {
   absl::StatusOr<client::Json> Statistics(const std::string& session);
   absl::StatusOr<HttpAnswer> View(const std::string& session);
   absl::StatusOr<HttpAnswer> Mesh(const std::string& session, const std::string& format);
+  client::Json FormatsByDimension(std::span<const int> dimensions) const;
   client::Json SecondsLeft(const client::Operation& operation);
   client::CallOptions Call() const;
+  client::CallOptions Look() const;  // for what the page asks again and again
 
   client::Client client_;
   const ConsoleOptions options_;

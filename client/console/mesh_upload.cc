@@ -112,6 +112,10 @@ std::string SafeFileName(std::string_view name) {
   return safe.empty() || safe[0] == '.' || safe[0] == '-' ? absl::StrCat("file", safe) : safe;
 }
 
+absl::Status WithoutFolder(const absl::Status& status, const formats::TemporaryFolder& folder) {
+  return client::WithMessage(status, absl::StrReplaceAll(status.message(), {{absl::StrCat(folder.path(), "/"), ""}}));
+}
+
 absl::StatusOr<UploadedMesh> UploadMesh(client::Client& client, const MeshUpload& upload,
                                         const client::CallOptions& call) {
   WELLSPACE_ASSIGN_OR_RETURN(const formats::TemporaryFolder folder, formats::TemporaryFolder::Make());
@@ -122,13 +126,9 @@ absl::StatusOr<UploadedMesh> UploadMesh(client::Client& client, const MeshUpload
                      "the file is empty; a file of points, of a domain or of a surface is expected")
                : absl::InternalError(absl::StrCat("the file cannot be moved: ", std::strerror(errno)));
   }
-  // The folder means nothing to the sender of the file.
-  const auto without_folder = [&folder](const absl::Status& status) {
-    return client::WithMessage(status, absl::StrReplaceAll(status.message(), {{absl::StrCat(folder.path(), "/"), ""}}));
-  };
   absl::StatusOr<Input> input = Read(path, upload.crossings);
   if (!input.ok()) {
-    return without_folder(input.status());
+    return WithoutFolder(input.status(), folder);
   }
   client::SessionOptions options;
   options.parameters = upload.parameters;
@@ -138,7 +138,7 @@ absl::StatusOr<UploadedMesh> UploadMesh(client::Client& client, const MeshUpload
   absl::StatusOr<client::Operation> started = Fill(client, session.name, *input, call);
   if (!started.ok()) {
     (void)client.DeleteSession(session.name);  // its lease ends it, should this fail
-    return without_folder(started.status());
+    return WithoutFolder(started.status(), folder);
   }
   for (std::string& note : input->notes) {
     note = absl::StrReplaceAll(note, {{absl::StrCat(folder.path(), "/"), ""}});

@@ -6,8 +6,10 @@
 #include <string_view>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "client/client.h"
+#include "client/formats/io/temporary_folder.h"
 
 namespace wellspace::console {
 
@@ -26,6 +28,9 @@ struct UploadedMesh {
 // The last part of `name` with letters, digits, dots, dashes and underscores alone; at most 100 bytes, of which the
 // extensions are kept. Never empty, nor hidden, nor a path.
 std::string SafeFileName(std::string_view name);
+
+// `status` without the path of the folder, which means nothing to the page.
+absl::Status WithoutFolder(const absl::Status& status, const formats::TemporaryFolder& folder);
 
 // Reads the file, makes a session with the label "file" of it, which has its points, segments and triangles, and starts
 // its refinement. As for the tool, .stl, .smesh and 3-D .poly are surfaces, whose inside is meant. On

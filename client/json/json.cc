@@ -202,4 +202,15 @@ Json ServerInfoJson(const ServerInfo& info) {
   return json;
 }
 
+const char* HealthName(Health health) {
+  switch (health) {
+    case Health::kServing:
+      return "serving";
+    case Health::kNotServing:
+      return "not serving";
+    default:
+      return "unknown";
+  }
+}
+
 }  // namespace wellspace::client

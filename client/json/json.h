@@ -36,6 +36,8 @@ Json ServerInfoJson(const ServerInfo& info);
 // "open", "running" and so on.
 const char* StateName(SessionState state);
 const char* StateName(OperationState state);
+// "serving", "not serving" or "unknown".
+const char* HealthName(Health health);
 // As --criterion has it.
 const char* CriterionName(Criterion criterion);
 // "2026-01-31T23:59:59Z".

@@ -38,6 +38,8 @@ struct EstimateEffort {
 
 // Enough for a bar of progress, at about a hundredth of the cost of meshing.
 inline constexpr EstimateEffort kGlance{0.15, 24, 64, uint64_t{1} << 11};
+// The same where many leaves lie outside of the domain.
+inline constexpr EstimateEffort kLongGlance{0.15, 64, 256, uint64_t{1} << 12};
 
 // Enough for a reservation of memory, at a few hundredths of the cost of meshing: a run that is short asks for more.
 inline constexpr EstimateEffort kForReservation{0.1, 32, 256, uint64_t{1} << 13};

@@ -113,17 +113,22 @@ absl::Status MesherOf<Domain>::Refine(const MeshParameters& given, RunContext& c
   return absl::OkStatus();
 }
 
-// How many vertices a first refinement will end with; 0 if the context knows, or it cannot be said, or it ends too soon
-// to be worth an estimate.
+template <typename Domain>
+std::optional<EstimateEffort> MesherOf<Domain>::PredictionEffort(const MeshCriteria<D>& criteria) const {
+  const bool is_short = criteria.sizes.IsUnbounded() && structure_.vertex_count() < kLeastPredicted<D>;
+  return is_short ? std::nullopt : std::optional(kGlance);
+}
+
+// How many vertices a first refinement will end with; 0 if the context knows, or nothing is to be predicted.
 template <typename Domain>
 absl::StatusOr<uint64_t> MesherOf<Domain>::PredictVertices(const MeshCriteria<D>& criteria,
                                                            const RunContext& context) const {
-  if (!IsPredictable() || context.estimated_vertices() > 0 || structure_.vertex_count() > structure_.built_count() ||
-      (criteria.sizes.IsUnbounded() && structure_.vertex_count() < kLeastPredicted<D>)) {
+  const std::optional<EstimateEffort> effort = PredictionEffort(criteria);
+  if (!effort.has_value() || context.estimated_vertices() > 0 || structure_.vertex_count() > structure_.built_count()) {
     return 0;
   }
   WELLSPACE_ASSIGN_OR_RETURN(const SizeEstimate size,
-                             EstimateSize<D>(structure_, criteria, context, kGlance, planar()));
+                             EstimateSize<D>(structure_, criteria, context, *effort, planar()));
   return SaturatedCount(size.vertices);
 }
 

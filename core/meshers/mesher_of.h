@@ -11,6 +11,7 @@
 #include "absl/status/statusor.h"
 #include "core/base/memory/huge_pages.h"
 #include "core/base/run_context.h"
+#include "core/estimate/estimate.h"
 #include "core/features/part_names.h"
 #include "core/geometry/box.h"
 #include "core/input/frame.h"
@@ -133,8 +134,9 @@ class MesherOf : public Mesher {
 
   // Takes the demands on the domain beside criteria.
   virtual void TakeDemands(const MeshParameters& /*parameters*/) {}
-  // Whether a glance at the tree tells how many vertices there will be.
-  virtual bool IsPredictable() const { return true; }
+  // The effort with which a first refinement predicts its vertices; none: it ends too soon to be worth that, or the
+  // vertices cannot be told.
+  virtual std::optional<EstimateEffort> PredictionEffort(const MeshCriteria<D>& criteria) const;
   // Adds the place, as far as it is known, to the error with which a run has ended.
   virtual absl::Status Explain(absl::Status status) const { return status; }
   // Forgets the results of the last refinement that are kept for the mesh: the next mesh will be another one.

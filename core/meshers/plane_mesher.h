@@ -54,8 +54,10 @@ class PlaneMesher final : public MesherOf<PlaneDomain> {
   absl::Status CheckDemands(const MeshParameters& parameters) const override;
   absl::Status CheckFeasibleHere(const MeshParameters& parameters) const override;
   const PlanarDomain* planar() const override { return planar_.get(); }
-  // Few leaves may all be outside of the domain.
-  bool IsPredictable() const override { return false; }
+  // Few leaves may all be outside of the domain: a glance would say too little. Without sizes it is meshed soon.
+  std::optional<EstimateEffort> PredictionEffort(const MeshCriteria<2>& criteria) const override {
+    return criteria.sizes.IsUnbounded() ? std::nullopt : std::optional(kLongGlance);
+  }
   void ForgetMade() override { made_.reset(); }
   absl::StatusOr<bool> Conform(const MeshParameters& parameters, RunContext& context) override;
   void NoteAddedFrom(uint32_t first) override;

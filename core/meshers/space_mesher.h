@@ -68,7 +68,9 @@ class SpaceMesher final : public MesherOf<SpaceDomain> {
   void TakeDemands(const MeshParameters& parameters) override;
   absl::Status Explain(absl::Status status) const override;
   // Few leaves may all be outside of the domain.
-  bool IsPredictable() const override { return false; }
+  std::optional<EstimateEffort> PredictionEffort(const MeshCriteria<3>& /*criteria*/) const override {
+    return std::nullopt;
+  }
   void ForgetMade() override { made_.reset(); }
   absl::StatusOr<bool> Conform(const MeshParameters& parameters, RunContext& context) override;
   absl::Status Improve(const MeshParameters& parameters, RunContext& context) override;

@@ -420,7 +420,10 @@ absl::Status Refinement<Domain>::CountRefined() {
     const uint64_t of_samples = SampleTree<D>::BytesFor(step_rules_->criteria().sizes.samples().size());
     WELLSPACE_RETURN_IF_ERROR(
         context_->AllowMemory(structure_.MemoryBytes() + MemoryBytes() + of_samples + domain_.MemoryBytes()));
-    context_->SetPhaseFraction(1 - static_cast<double>(pending_.schedule().size()) / structure_.vertex_count());
+    // Of the vertices that there will be, most are yet to come where a small size is asked for.
+    const uint64_t vertices = structure_.vertex_count();
+    const uint64_t refined = vertices - std::min<uint64_t>(vertices, pending_.schedule().size());
+    context_->SetPhaseFraction(static_cast<double>(refined) / std::max(vertices, context_->estimated_vertices()));
   }
   return absl::OkStatus();
 }

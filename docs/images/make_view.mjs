@@ -1,7 +1,8 @@
 #!/usr/bin/env node
-// Makes the pictures of docs/view.md with Chromium, of meshes of examples/:
+// Makes the pictures of README.md and docs/view.md with Chromium, of the pages that scripts/demo leaves in demo/, and of
+// a mesh of examples/:
 //
-//   npm ci --prefix tests/node && deploy/install-deps.sh browser && docs/images/make_view.mjs
+//   scripts/demo && npm ci --prefix tests/node && deploy/install-deps.sh browser && docs/images/make_view.mjs
 //
 // The tool is build/release/bin/wellspace.
 
@@ -21,33 +22,52 @@ const browser = await chromium.launch({
   args: ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", ...(process.getuid() === 0 ? ["--no-sandbox"] : [])],
 });
 
-async function take(input, name, up, steps) {
-  const mesh = join(folder, `${name}.npz`);
-  wellspace("mesh", join(root, "examples", input), "-o", mesh, "--quiet");
-  wellspace("view", mesh, "-o", `${mesh}.html`, "--up", up);
-  const page = await browser.newPage({ viewport: { width: 1280, height: 800 }, reducedMotion: "reduce" });
-  await page.goto(pathToFileURL(`${mesh}.html`).href);
+const image = (name) => join(root, "docs/images", name);
+const demo = (name) => join(root, "demo", `${name}.html`);
+
+async function take(path, steps, height = 800) {
+  const page = await browser.newPage({ viewport: { width: 1280, height }, reducedMotion: "reduce" });
+  await page.goto(pathToFileURL(path).href);
   await page.waitForSelector("html[data-state=ready]");
   await steps(page);
   await page.waitForTimeout(500);
   return page;
 }
 
-const cut = await take("spot.csv", "spot", "y", async (page) => {
+/** The picture that the page saves, with its legend. */
+async function save(page, name) {
+  const [download] = await Promise.all([page.waitForEvent("download"), page.click("#save")]);
+  await download.saveAs(image(name));
+}
+
+const part = await take(demo("bracket"), async (page) => {
+  await page.selectOption("#colour", "angle");
+  await page.check("#cut", { force: true });
+  await page.locator("#offset").fill("650");
+});
+await save(part, "bracket.png");
+
+const ocean = await take(demo("ocean"), async (page) => page.selectOption("#colour", "angle"), 600);
+await save(ocean, "ocean.png");
+
+const cut = await take(demo("spot"), async (page) => {
   await page.check("input[value=flat]", { force: true });
   await page.selectOption("#colour", "size");
   await page.evaluate(() => document.activeElement.blur());
 });
-await cut.screenshot({ path: join(root, "docs/images/view-cut.png") });
+await cut.screenshot({ path: image("view-cut.png") });
 
-const map = await take("land-110m.geojson.gz", "land", "z", async (page) => {
+const land = join(folder, "land.npz");
+wellspace("mesh", join(root, "examples/land-110m.geojson.gz"), "-o", land, "--quiet");
+wellspace("view", land, "-o", `${land}.html`);
+const map = await take(`${land}.html`, async (page) => {
   await page.mouse.move(505, 420);
   for (let i = 0; i < 4; ++i) await page.mouse.wheel(0, -180);
   await page.waitForTimeout(500);
   await page.mouse.click(560, 350);
   await page.mouse.move(480, 450);
 });
-await map.screenshot({ path: join(root, "docs/images/view-map.png") });
+await map.screenshot({ path: image("view-map.png") });
 
 await browser.close();
 rmSync(folder, { recursive: true });

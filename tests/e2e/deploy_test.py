@@ -1,12 +1,20 @@
 """The files of deploy/ that have to agree with each other."""
+import json
+import os
 import pathlib
 import re
+import socket
+import subprocess
 import unittest
+import urllib.parse
+import urllib.request
 
 try:
     import yaml
 except ImportError:
     yaml = None
+
+import wellspaced
 
 DEPLOY = pathlib.Path(__file__).resolve().parents[2] / "deploy"
 
@@ -45,6 +53,46 @@ class ReplicasTest(unittest.TestCase):
         script = self.services["proxy"]["command"][2]
         for pattern, _ in re.findall(r"-e 's#([^#]*)#([^#]*)#", script):
             self.assertRegex(self.proxy, pattern)
+
+
+@unittest.skipIf(yaml is None, "python3-yaml is not installed")
+class ConsoleTest(unittest.TestCase):
+    def setUp(self):
+        self.files = {name: yaml.safe_load((DEPLOY / name).read_text())["services"]
+                      for name in ("compose.yaml", "compose.replicas.yaml")}
+        self.console = self.files["compose.yaml"]["console"]
+
+    def test_is_on_the_loopback_of_the_host_where_the_server_is_published(self):
+        replicas = self.files["compose.replicas.yaml"]
+        self.assertEqual(replicas["console"]["extends"], {"file": "compose.yaml", "service": "console"})
+        self.assertEqual(self.console["network_mode"], "host")
+        self.assertNotIn("ports", self.console)
+        server = self.console["environment"]["WELLSPACE_SERVER"]
+        port = server.rsplit(":", 1)[1]
+        for publisher in (self.files["compose.yaml"]["wellspace"], replicas["proxy"]):
+            self.assertIn(f"{server}:{port}", publisher["ports"])
+        for services in self.files.values():
+            self.assertNotIn("127.0.0.1:8080:", str(services))  # nothing else takes its port
+
+    def test_command_serves_the_page_on_the_loopback_alone(self):
+        server = wellspaced.Wellspaced("--ephemeral")
+        self.addCleanup(server.stop)
+        program, *arguments = self.console["entrypoint"]
+        self.assertEqual(arguments.pop(), "--port=8080")
+        environment = {**os.environ, **self.console["environment"],
+                       **self.files["compose.replicas.yaml"]["console"]["environment"],
+                       "WELLSPACE_SERVER": server.address}
+        console = subprocess.Popen([wellspaced.BIN / program, *arguments], env=environment, stdout=subprocess.PIPE,
+                                   text=True)
+        self.addCleanup(console.communicate)
+        self.addCleanup(console.terminate)
+        url = console.stdout.readline().strip()
+        self.assertRegex(url, r"^http://127\.0\.0\.1:\d+/[0-9a-f]{32}/$")
+        with urllib.request.urlopen(url + "api/server", timeout=60) as answer:
+            self.assertEqual(json.load(answer)["health"], "serving")
+        port = urllib.parse.urlsplit(url).port
+        with self.assertRaises(ConnectionRefusedError):
+            socket.create_connection(("127.0.0.2", port), timeout=60)
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@
 
 #include "client/formats/cloud.h"
 #include "client/formats/io/output_file.h"
-#include "client/formats/numpy/zip_file.h"
+#include "client/formats/io/zip_file.h"
 #include "client/formats/read_mesh.h"
 #include "client/formats/vtk/vtk_array.h"
 #include "client/formats/write_mesh.h"

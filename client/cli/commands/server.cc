@@ -50,17 +50,6 @@ absl::Status PrintInfo(const RemoteCommand& remote, client::Client& client, cons
   return absl::OkStatus();
 }
 
-const char* HealthName(client::Health health) {
-  switch (health) {
-    case client::Health::kServing:
-      return "serving";
-    case client::Health::kNotServing:
-      return "not serving";
-    default:
-      return "unknown";
-  }
-}
-
 absl::Status PrintHealth(const RemoteCommand& remote, const std::string& service, client::Client& client,
                          const client::CallOptions& call) {
   WELLSPACE_ASSIGN_OR_RETURN(const client::Health health, client.CheckHealth(service, call));

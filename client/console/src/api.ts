@@ -38,10 +38,14 @@ export interface Entry {
   seconds_left?: number | null;
 }
 
+/** The formats of meshes of each dimension. */
+export type Formats = Record<string, string[]>;
+
 export interface Server {
   server: string | null;
   info: Record<string, unknown>;
-  formats: string[];
+  health: string;
+  formats: Formats;
 }
 
 export interface Field {

@@ -23,7 +23,7 @@ function tell(error: unknown): void {
 let timer = 0;
 let list: SessionList | undefined;
 
-function showServer({ server, info }: api.Server): void {
+function showServer({ server, info, health }: api.Server): void {
   const number = (name: string): number => Number(info[name] ?? 0);
   const where = server ?? "in this program";
   setText(byId("server"), `${where}: ${number("running_jobs")} running, ${number("queued_jobs")} queued`);
@@ -31,6 +31,7 @@ function showServer({ server, info }: api.Server): void {
   const stored = number("max_stored_bytes_per_tenant");
   describe(byId("figures"), [
     ["Version", String(info["version"] ?? "")],
+    ["Health", health],
     ["Jobs that run", `${number("running_jobs")} of ${number("workers")}`],
     ["Jobs that wait", `${number("queued_jobs")} of at most ${count(number("max_queued_jobs"))}`],
     ["Most points", count(number("max_points"))],

@@ -1,8 +1,9 @@
 // The list of sessions: one card for each, kept while it is there, so that focus stays where it is.
 
-import type { Entry } from "./api.js";
+import type { Entry, Formats } from "./api.js";
 import * as api from "./api.js";
 import { button, bytes, count, duration, make, setText } from "./elements.js";
+import { Growth } from "./growth.js";
 
 export interface Actions {
   view(entry: Entry): void;
@@ -21,6 +22,7 @@ class Card {
   private readonly facts = make("p", "", { class: "facts" });
   private readonly state = make("p", "", { class: "state" });
   private readonly progress = make("progress", "", { max: "1" });
+  private readonly growth = new Growth();
   private readonly viewButton: HTMLButtonElement;
   private readonly statisticsButton: HTMLButtonElement;
   private readonly cancelButton: HTMLButtonElement;
@@ -29,7 +31,7 @@ class Card {
   private readonly download = make("a", "Download", { class: "button" });
   private entry: Entry;
 
-  constructor(entry: Entry, formats: string[], actions: Actions) {
+  constructor(entry: Entry, formats: Formats, actions: Actions) {
     this.entry = entry;
     const session = entry.session.name;
     this.viewButton = button("View", () => actions.view(this.entry));
@@ -37,12 +39,13 @@ class Card {
     this.cancelButton = button("Cancel", () => actions.run("cancel", () => api.cancel(session)));
     this.refineButton = button("Refine", () => actions.run("refine", () => api.refine(session, actions.parameters())));
     const remove = button("Delete", () => actions.run("delete", () => api.remove(session)));
-    for (const format of formats) this.format.append(make("option", format, { value: format }));
+    const known = formats[String(entry.session.parameters["dimension"])] ?? [];
+    for (const format of known) this.format.append(make("option", format, { value: format }));
     this.format.addEventListener("change", () => this.showLink());
     const row = make("div", "", { class: "row" });
     row.append(this.viewButton, this.statisticsButton, this.format, this.download, this.refineButton,
       this.cancelButton, remove);
-    this.element.append(this.title, this.facts, this.state, this.progress, row);
+    this.element.append(this.title, this.facts, this.state, this.progress, this.growth.element, row);
     this.progress.setAttribute("aria-label", `Progress of ${nameOf(entry)}`);
     this.format.setAttribute("aria-label", `Format of ${nameOf(entry)}`);
     for (const one of [this.viewButton, this.statisticsButton, this.cancelButton, this.refineButton, remove]) {
@@ -68,6 +71,10 @@ class Card {
     const busy = isBusy(entry);
     const hasMesh = session.vertex_count > 0;
     this.element.dataset["state"] = operation?.state ?? session.state;
+    if (operation?.state === "running") {
+      const { phase, vertices } = operation.progress;
+      this.growth.add(operation.name, phase, vertices, performance.now() / 1000);
+    }
     setText(this.state, this.stateText(entry));
     this.progress.hidden = !busy;
     this.progress.value = operation?.progress.fraction ?? 0;
@@ -85,7 +92,9 @@ class Card {
     const { phase, fraction, vertices } = operation.progress;
     if (operation.state === "running") {
       const left = seconds_left == null ? "" : `, ${duration(seconds_left)} left`;
-      return `${phase}: ${Math.floor(fraction * 100)} %, ${count(vertices)} vertices${left}`;
+      const { rate } = this.growth;
+      const speed = rate === null ? "" : `, ${count(Math.round(rate))}/s`;
+      return `${phase}: ${Math.floor(fraction * 100)} %, ${count(vertices)} vertices${speed}${left}`;
     }
     return operation.error === null ? operation.state : `${operation.state}: ${operation.error.message}`;
   }
@@ -101,7 +110,7 @@ export class SessionList {
   constructor(
     private readonly list: HTMLElement,
     private readonly actions: Actions,
-    private readonly formats: string[],
+    private readonly formats: Formats,
   ) {}
 
   show(entries: Entry[]): void {

@@ -12,8 +12,8 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "client/formats/io/output_file.h"
+#include "client/formats/io/zip_file.h"
 #include "client/formats/names.h"
-#include "client/formats/numpy/zip_file.h"
 
 namespace wellspace::formats {
 

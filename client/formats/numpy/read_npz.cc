@@ -14,10 +14,10 @@
 #include "client/formats/cloud_readers.h"
 #include "client/formats/io/input_file.h"
 #include "client/formats/io/line_reader.h"
+#include "client/formats/io/zip_file.h"
 #include "client/formats/mesh_readers.h"
 #include "client/formats/numpy/npy.h"
 #include "client/formats/numpy/npz.h"
-#include "client/formats/numpy/zip_file.h"
 #include "client/formats/regions.h"
 #include "core/base/status_macros.h"
 

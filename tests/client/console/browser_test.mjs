@@ -4,8 +4,10 @@
 
 import assert from "node:assert/strict";
 import { execFileSync, spawn } from "node:child_process";
-import { readFileSync } from "node:fs";
+import { createHash } from "node:crypto";
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
+import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { test } from "node:test";
 import { fileURLToPath } from "node:url";
@@ -45,7 +47,11 @@ const browser = await chromium.launch({
   executablePath: execFileSync("sh", ["-c", "command -v chromium"], { encoding: "utf8" }).trim(),
   args: ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", ...(process.getuid() === 0 ? ["--no-sandbox"] : [])],
 });
-test.after(() => browser.close());
+const folder = mkdtempSync(join(tmpdir(), "console-"));
+test.after(async () => {
+  await browser.close();
+  rmSync(folder, { recursive: true });
+});
 
 /** Opens the page of a console, and runs `check` with it. What the page complains about is an error. */
 async function open(url, check, options = {}, allowed = []) {
@@ -115,6 +121,17 @@ test("files that are dropped become meshes, which are shown and downloaded", asy
     const frame = page.frameLocator("#frame");
     await frame.locator("html[data-state=ready]").waitFor();
     assert.equal(await frame.locator("#name").innerText(), "cloud.csv");
+    // The histogram of its mesh, of which a bar selects.
+    await frame.locator("#colour").selectOption("angle");
+    const counts = await frame.locator(".bar").evaluateAll((bars) =>
+      bars.map((bar) => Number(/: ([\d\s]+) elements/.exec(bar.getAttribute("aria-label"))[1].replace(/\s/g, ""))),
+    );
+    const elements = Number(/· ([\d\s]+) tetrahedra/.exec(await frame.locator("#summary").innerText())[1].replace(/\s/g, ""));
+    assert.equal(counts.reduce((sum, one) => sum + one), elements);
+    const fullest = counts.indexOf(Math.max(...counts));
+    await frame.locator(".bar").nth(fullest).click();
+    await frame.locator("#clear").waitFor();
+    assert.match(await frame.locator("#selection-text").innerText(), new RegExp(`^${counts[fullest]} of`));
     await page.getByRole("button", { name: "Close" }).click();
     await page.waitForSelector("#frame:not([src])", { state: "attached" });
     await card(page, "lake.geojson").getByRole("button", { name: "Statistics" }).click();
@@ -128,6 +145,23 @@ test("files that are dropped become meshes, which are shown and downloaded", asy
     ]);
     assert.equal(download.suggestedFilename(), "mesh.msh");
     assert.match(readFileSync(await download.path(), "latin1"), /^\$MeshFormat/);
+    // Formats of several files come as archives; such as cannot hold the mesh are not offered.
+    const formats = (name) => card(page, name).locator("select option").allInnerTexts();
+    assert.ok((await formats("lake.geojson")).includes("adcirc") && !(await formats("part.stl")).includes("adcirc"));
+    for (const [format, members] of [
+      ["node", ["mesh.ele", "mesh.face", "mesh.node"]],
+      ["xdmf", ["mesh.h5", "mesh.xdmf", "mesh_boundary.h5", "mesh_boundary.xdmf"]],
+    ]) {
+      await card(page, "part.stl").locator("select").selectOption(format);
+      const [archive] = await Promise.all([
+        page.waitForEvent("download"),
+        card(page, "part.stl").getByRole("link", { name: "Download" }).click(),
+      ]);
+      assert.equal(archive.suggestedFilename(), `mesh.${format}.zip`);
+      const code = "import sys, zipfile; print('\\n'.join(sorted(zipfile.ZipFile(sys.argv[1]).namelist())))";
+      const names = execFileSync("python3", ["-c", code, await archive.path()], { encoding: "utf8" });
+      assert.deepEqual(names.split("\n").filter((name) => members.includes(name)), members, names);
+    }
     for (const name of ["lake.geojson", "cloud.csv", "part.stl"]) await card(page, name).getByRole("button", { name: "Delete" }).click();
     await page.waitForSelector("#none:visible");
   });
@@ -142,6 +176,14 @@ test("work is watched and cancelled, by parameters of the form", async () => {
     await long.locator("progress:visible").waitFor();
     const before = await long.locator("progress").evaluate((bar) => bar.value);
     await page.waitForFunction((value) => document.querySelector("#sessions progress").value > value, before);
+    // Rate and time left, and a curve that grows.
+    const speed = /\d+ %, [\d\u2009]+ vertices, [\d\u2009]+\/s, [\d hmins]+ left/;
+    await page.waitForFunction((source) => new RegExp(source).test(document.querySelector("#sessions .state").textContent), speed.source);
+    assert.match(await long.locator(".growth").getAttribute("aria-label"), /^Vertices over \d+ s, up to [\d\u2009]+$/);
+    const places = () => long.locator(".growth polyline").evaluate((line) => line.points.numberOfItems);
+    const some = await places();
+    assert.ok(some > 2, `${some}`);
+    await page.waitForFunction((least) => document.querySelector(".growth polyline").points.numberOfItems > least, some);
     await long.getByRole("button", { name: "Cancel" }).click();
     await ended(page, "long.geojson", "cancelled");
     await page.fill("#field-max_circumradius", "0.5");
@@ -172,6 +214,58 @@ test("wrong files are told, and names are no markup", async () => {
     {},
     ["400 (Bad Request)"],
   );
+});
+
+test("two tenants over TLS see their own sessions alone", async () => {
+  const file = (name) => join(folder, name);
+  execFileSync("openssl", ["req", "-x509", "-days", "2", "-subj", "/CN=localhost", "-addext",
+    "subjectAltName=IP:127.0.0.1,DNS:localhost", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes",
+    "-keyout", file("key.pem"), "-out", file("cert.pem")], { stdio: "ignore" });
+  const tenants = ["acme", "globex"];
+  const hash = (text) => createHash("sha256").update(text).digest("hex");
+  const tokenOf = (name) => `a-token-of-${name}-of-more-than-32-characters`;
+  for (const name of [...tenants, "nobody"]) writeFileSync(file(`${name}.token`), tokenOf(name), { mode: 0o600 });
+  writeFileSync(file("tokens"), tenants.map((name) => `${name} sha256:${hash(tokenOf(name))}\n`).join(""), { mode: 0o600 });
+  const daemon = await start("wellspaced", ["--listen", "127.0.0.1:0", "--ephemeral", "--tls-cert", file("cert.pem"), "--tls-key",
+    file("key.pem"), "--token-file", file("tokens")], /127\.0\.0\.1:\d+/);
+  const consoleOf = (name) =>
+    startConsole("--server", daemon.found, "--tls-ca", file("cert.pem"), "--token-file", file(`${name}.token`));
+  const consoles = await Promise.all(tenants.map(consoleOf));
+  await open(consoles[0].found, async (acme) => {
+    await open(consoles[1].found, async (globex) => {
+      await give(acme, "acme.csv", cloud);
+      await ended(acme, "acme.csv");
+      await give(globex, "globex.geojson", lake);
+      await ended(globex, "globex.geojson");
+      for (const [page, own, other] of [[acme, "acme.csv", consoles[1]], [globex, "globex.geojson", consoles[0]]]) {
+        await page.reload();
+        await page.waitForSelector("html[data-state=ready]");
+        assert.deepEqual(await page.locator("#sessions h3").allInnerTexts(), [own]);
+        // Nor by the name of the session that the other one's page has.
+        const name = await (await fetch(`${other.found}api/sessions`)).json();
+        const foreign = name.sessions[0].session.name;
+        const statuses = await page.evaluate(
+          async (session) => [
+            (await fetch(`api/${session}/statistics`)).status,
+            (await fetch(`${session}/view`)).status,
+            (await fetch(`${session}/mesh?format=vtu`)).status,
+            (await fetch(`api/${session}`, { method: "DELETE" })).status,
+          ],
+          foreign,
+        );
+        assert.deepEqual(statuses, [404, 404, 404, 404]);
+      }
+    }, {}, ["404 (Not Found)"]);
+  }, {}, ["404 (Not Found)"]);
+  // A token that the server does not know.
+  const stranger = await consoleOf("nobody");
+  const page = await browser.newPage();
+  await page.goto(stranger.found);
+  await page.waitForSelector("html[data-state=lost]");
+  assert.match(await page.locator("#server").innerText(), /token/);
+  assert.ok(!(await page.content()).includes(tokenOf("nobody")));
+  await page.close();
+  for (const one of [stranger, ...consoles, daemon]) await end(one);
 });
 
 test("another page gets no answer", async () => {

@@ -7,7 +7,11 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
 #include <map>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -16,6 +20,8 @@
 
 #include "client/connection.h"
 #include "client/console/http_server.h"
+#include "client/formats/io/input_file.h"
+#include "client/formats/io/zip_file.h"
 #include "server/embedded_server.h"
 #include "tests/support/temporary_folder.h"
 
@@ -152,21 +158,46 @@ TEST_F(ConsoleTest, ASurfaceMeansItsInside) {
 TEST_F(ConsoleTest, AMeshIsDownloadedAndShown) {
   const std::string session = Mesh("points.csv", "0,0,0\n1,0,0\n0,1,0\n0,0,1\n1,1,1\n");
   const json server = Ask("GET", "api/server").value();
-  EXPECT_GT(server["formats"].size(), 5u);
-  for (const json& format : server["formats"]) {
-    if (format == "adcirc" || format == "2dm") {
-      EXPECT_EQ(Ask("GET", session + "/mesh?format=" + format.get<std::string>()).status, 400) << format;
-      continue;
-    }
-    const Answer file = Ask("GET", session + "/mesh?format=" + format.get<std::string>());
+  EXPECT_EQ(server["health"], "serving");
+  EXPECT_GT(server["formats"]["3"].size(), 10u);
+  for (const std::string format : server["formats"]["3"]) {
+    const Answer file = Ask("GET", session + "/mesh?format=" + format);
     EXPECT_EQ(file.status, 200) << format << file.body;
     EXPECT_THAT(file.head, HasSubstr("Content-Disposition: attachment; filename=\"mesh.")) << format;
     EXPECT_GT(file.body.size(), 100u) << format;
+  }
+  const json in_plane = server["formats"]["2"];
+  for (const std::string format : {"adcirc", "2dm"}) {
+    EXPECT_TRUE(std::find(in_plane.begin(), in_plane.end(), format) != in_plane.end()) << in_plane;
+    const Answer refused = Ask("GET", session + "/mesh?format=" + format);
+    EXPECT_EQ(refused.status, 400) << format;
+    EXPECT_THAT(refused.body, Not(HasSubstr("/tmp"))) << format;
   }
   const Answer page = Ask("GET", session + "/view");
   EXPECT_EQ(page.status, 200);
   EXPECT_THAT(page.head, HasSubstr("frame-ancestors 'self'"));
   EXPECT_THAT(page.body, HasSubstr("points.csv"));
+  EXPECT_EQ(folder_.FileCount(), 0);
+}
+
+TEST_F(ConsoleTest, FormatsOfSeveralFilesAreArchives) {
+  const std::string session = Mesh("points.csv", "0,0,0\n1,0,0\n0,1,0\n0,0,1\n1,1,1\n");
+  const std::map<std::string, std::vector<std::string>> members = {
+      {"node", {"mesh.node", "mesh.ele", "mesh.face"}},
+      {"xdmf", {"mesh.xdmf", "mesh.h5", "mesh_boundary.xdmf", "mesh_boundary.h5"}}};
+  for (const auto& [format, names] : members) {
+    const Answer file = Ask("GET", session + "/mesh?format=" + format);
+    ASSERT_EQ(file.status, 200) << file.body;
+    EXPECT_THAT(file.head, HasSubstr("filename=\"mesh." + format + ".zip\""));
+    const std::string path = folder_.Path("got.zip");
+    std::ofstream(path, std::ios::binary) << file.body;
+    const std::unique_ptr<formats::ZipReader> archive = *formats::ZipReader::Open(*formats::InputFile::Open(path));
+    for (const std::string& name : names) {
+      EXPECT_TRUE(archive->Has(name)) << name;
+      EXPECT_GT(archive->Begin(name).value_or(0), 20u) << name;
+    }
+    std::filesystem::remove(path);
+  }
   EXPECT_EQ(folder_.FileCount(), 0);
 }
 

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "client/formats/io/input_file.h"
+#include "client/formats/io/zip_file.h"
 #include "client/formats/numpy/npy.h"
-#include "client/formats/numpy/zip_file.h"
 #include "tests/support/temporary_folder.h"
 
 namespace wellspace::client {

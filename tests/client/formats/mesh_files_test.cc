@@ -10,8 +10,8 @@
 #include <random>
 
 #include "client/formats/io/output_file.h"
+#include "client/formats/io/zip_file.h"
 #include "client/formats/numpy/npy.h"
-#include "client/formats/numpy/zip_file.h"
 #include "client/formats/read_cloud.h"
 #include "client/formats/read_mesh.h"
 #include "client/formats/write_mesh.h"

@@ -12,9 +12,11 @@
 #include <set>
 #include <span>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
+#include "core/base/run_context.h"
 #include "core/geometry/exact_measure.h"
 #include "core/meshers/mesher.h"
 #include "core/simplex/quality.h"
@@ -82,6 +84,31 @@ TEST(PlaneMesherTest, ASquareIsTwoTriangles) {
   EXPECT_EQ(mesh->facet_count(), 4u);
   EXPECT_THAT(mesh->domain_high, ElementsAre(1, 1));
   ExpectConforming(*mesh);
+}
+
+// Where a size is asked for, most vertices are yet to come: few that wait do not mean that little is left.
+TEST(PlaneMesherTest, ProgressFollowsTheVerticesThatTheSizeAsksFor) {
+  Input input = Input().Ring({{0, 0}, {4, 0}, {4, 3}, {1, 2}});
+  input.parameters.max_circumradius = 0.01;
+  RunContext context;
+  std::vector<Progress> seen;
+  std::thread watcher([&] {
+    do {
+      seen.push_back(context.Snapshot());
+      std::this_thread::yield();
+    } while (seen.back().phase < Phase::kSimplices);
+  });
+  const auto mesh = MeshPoints(input.parameters, {input.points, input.features()}, context);
+  watcher.join();
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  EXPECT_NEAR(static_cast<double>(context.estimated_vertices()) / mesh->vertex_count(), 1, 0.5);
+  double most = 0;
+  for (const Progress& progress : seen) {
+    const bool is_early = progress.vertices < mesh->vertex_count() / 2;
+    most = is_early ? std::max(most, progress.fraction) : most;
+  }
+  EXPECT_GT(most, 0.06);
+  EXPECT_LT(most, 0.45);
 }
 
 TEST(PlaneMesherTest, AHoleStaysEmptyAndItsEdgeHasAMarker) {

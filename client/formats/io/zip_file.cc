@@ -1,4 +1,4 @@
-#include "client/formats/numpy/zip_file.h"
+#include "client/formats/io/zip_file.h"
 
 #include <minizip/unzip.h>
 #include <minizip/zip.h>

@@ -1,6 +1,6 @@
 // Zip archives, member by member, by minizip: zip64, stored or deflated members.
-#ifndef WELLSPACE_CLIENT_FORMATS_NUMPY_ZIP_FILE_H_
-#define WELLSPACE_CLIENT_FORMATS_NUMPY_ZIP_FILE_H_
+#ifndef WELLSPACE_CLIENT_FORMATS_IO_ZIP_FILE_H_
+#define WELLSPACE_CLIENT_FORMATS_IO_ZIP_FILE_H_
 
 #include <cstdint>
 #include <memory>
@@ -78,4 +78,4 @@ class ZipReader {
 
 }  // namespace wellspace::formats
 
-#endif  // WELLSPACE_CLIENT_FORMATS_NUMPY_ZIP_FILE_H_
+#endif  // WELLSPACE_CLIENT_FORMATS_IO_ZIP_FILE_H_
