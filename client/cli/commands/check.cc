@@ -49,6 +49,7 @@ core::Criterion CriterionToCore(client::Criterion criterion) {
     case client::Criterion::kWellSpaced:
       return core::Criterion::kWellSpaced;
     case client::Criterion::kRadiusEdge:
+    case client::Criterion::kUnknown:  // which AddCriterion does not offer
       break;
   }
   return core::Criterion::kRadiusEdge;
