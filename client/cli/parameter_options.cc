@@ -12,13 +12,13 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
-#include "client/cli/json.h"
 #include "client/cli/length.h"
 #include "client/cli/options.h"
 #include "client/cli/size_field_options.h"
 #include "client/error_details.h"
 #include "client/formats/cloud.h"
 #include "client/formats/io/number.h"
+#include "client/json/json.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::cli {
