@@ -18,8 +18,8 @@ SQRT2 = math.sqrt(2)
 
 Size = collections.namedtuple("Size", "cloud rho peer peer_vertices design")
 
-# Peers: Triangle -q20.705 (-q30 for rho = 1) and TetGen -zpq<rho>/0O0/0NEF on the same points in the same box. Design: a
-# prototype of the algorithm, one vertex after the other, buckets of sqrt(2) (1.2 for rho = 1).
+# Peers: Triangle -q20.705 (-q30 for rho = 1) and TetGen -zpq<rho>/0O0/0NEF on the same points in the same box. Design:
+# a prototype of the algorithm, one vertex after the other, buckets of sqrt(2) (1.2 for rho = 1).
 SIZES = [
     Size("uniform-2-10000", SQRT2, "Triangle", 16601, 16659),
     Size("inner-2-10000", SQRT2, "Triangle", 16211, 16150),

@@ -39,7 +39,8 @@ def run(folder, program, path, *arguments):
 def first_line(*command):
     """The first line of a command's output, or an empty string."""
     try:
-        return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.partition("\n")[0].strip()
+        return subprocess.run(command, cwd=ROOT, capture_output=True, text=True,
+                              check=True).stdout.partition("\n")[0].strip()
     except (OSError, subprocess.CalledProcessError):
         return ""
 

@@ -135,14 +135,15 @@ BETA = 4
 
 
 def cells(cloud, targets=(), quick=False):
-    return Row(f"cell/{cloud}", f"x faster than voro++ a cell; clipped, beta = {BETA}", cell_times_faster, ">=", targets,
-               {1: Run("wellspace_cells", cloud, ("--beta", BETA))}, [Run("voro_cells", cloud, ())], quick)
+    return Row(f"cell/{cloud}", f"x faster than voro++ a cell; clipped, beta = {BETA}", cell_times_faster, ">=",
+               targets, {1: Run("wellspace_cells", cloud, ("--beta", BETA))}, [Run("voro_cells", cloud, ())], quick)
 
 
 # The same, but each cell is asked for on its own.
 def cells_alone(cloud, quick=False):
-    return Row(f"cell-alone/{cloud}", f"x faster than voro++ a cell; clipped, beta = {BETA}, each on its own", cell_times_faster,
-               ">=", (), {1: Run("wellspace_cells", cloud, ("--beta", BETA, "--alone"))}, [Run("voro_cells", cloud, ())], quick)
+    return Row(f"cell-alone/{cloud}", f"x faster than voro++ a cell; clipped, beta = {BETA}, each on its own",
+               cell_times_faster, ">=", (), {1: Run("wellspace_cells", cloud, ("--beta", BETA, "--alone"))},
+               [Run("voro_cells", cloud, ())], quick)
 
 
 def whole_cells(cloud, quick=False):

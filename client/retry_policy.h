@@ -1,4 +1,4 @@
-// When a call is made again, and after which time.
+// The policy of retries: the number of attempts at a call, and the times between them.
 #ifndef WELLSPACE_CLIENT_RETRY_POLICY_H_
 #define WELLSPACE_CLIENT_RETRY_POLICY_H_
 

@@ -15,7 +15,8 @@
 namespace wellspace::client {
 
 // The quantity that `rho` bounds; see the proto's Criterion.
-enum class Criterion { kRadiusEdge, kWellSpaced };
+// kUnknown: one of a newer server, which no server takes from this client.
+enum class Criterion { kUnknown, kRadiusEdge, kWellSpaced };
 
 // A box in which simplices are small; see the proto's SizeBox.
 struct SizeBox {

@@ -24,7 +24,8 @@ build() {
   cmake --build --preset "${preset}" --target "${targets[@]}" --parallel "$(build_jobs)" </dev/null
 }
 
-# node_modules FOLDER: installs what FOLDER/package-lock.json says, if it is not there yet; fails if it cannot. Development only.
+# node_modules FOLDER: installs what FOLDER/package-lock.json says, if it is not there yet; fails if it cannot. It is for
+# development only.
 node_modules() {
   # Node.js from elsewhere brings npm along, and Debian's package npm would contradict it.
   if ! command -v npm >/dev/null; then deploy/install-deps.sh node || return; fi

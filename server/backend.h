@@ -91,7 +91,8 @@ class Backend {
   SessionRegistry sessions_;
   OtherOwners other_owners_;
   std::mutex unlogged_mutex_;
-  std::vector<SessionChange> unlogged_;  // deletions of sessions that have expired, still to be made; guarded by it
+  std::vector<SessionChange>
+      unlogged_;  // deletions of sessions that have expired, still to be made; guarded by unlogged_mutex_
   const IdleSessions idle_sessions_;
   const CallEnvironment environment_;
   // The background thread ends first. Each other ends before those above it, and before the parts that it uses.

@@ -58,7 +58,7 @@ void PrintNotes(const CloudReport& report, OutputFormat format, bool quiet) {
   }
 }
 
-void AddNotes(const CloudReport& report, Json& json) {
+void AddNotes(const CloudReport& report, client::Json& json) {
   if (report.skipped_points.has_value()) {
     json["skipped_points"] = *report.skipped_points;
   }
@@ -71,12 +71,12 @@ void AddNotes(const CloudReport& report, Json& json) {
 }
 
 std::string WithNotes(const CloudReport& report, const std::string& object) {
-  Json notes = Json::object();
+  client::Json notes = client::Json::object();
   AddNotes(report, notes);
   if (notes.empty()) {
     return object;
   }
-  std::string text = JsonText(notes, /*indented=*/true);
+  std::string text = client::JsonText(notes, /*indented=*/true);
   // "{\n  …\n}" and "{\n  …": the end of the one gives way to the other's members.
   text.replace(text.rfind("\n}"), std::string::npos, ",");
   return text + object.substr(object.find('\n'));

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "client/cli/exit_codes.h"
-#include "client/cli/json.h"
 #include "client/formats/read_cloud.h"
+#include "client/json/json.h"
 
 namespace wellspace::cli {
 
@@ -34,8 +34,8 @@ CloudReport ReportOf(const formats::CloudOptions& options, std::vector<std::stri
 void PrintNotes(const CloudReport& report, OutputFormat format, bool quiet);
 
 // Adds notes, if there are any, and skipped_points, if they were to be skipped, to an object.
-void AddNotes(const CloudReport& report, Json& json);
-// The same for the text of an object that Json::dump(2) made, without reading it.
+void AddNotes(const CloudReport& report, client::Json& json);
+// The same for the text of an object that client::Json::dump(2) made, without reading it.
 std::string WithNotes(const CloudReport& report, const std::string& object);
 
 }  // namespace wellspace::cli

@@ -53,8 +53,9 @@ void DomainOptions::AddReadingTo(CLI::App& command, const std::string& what) {
                   "lines")
       ->check(CLI::IsMember(FaceRuleNames()));
   command
-      .add_option("--region-property", reading_.region_property,
-                  "Of .geojson: the property, a whole number, that is the region of the triangles in a polygon")
+      .add_option(
+          "--region-property", reading_.region_property,
+          "Of .geojson: the property, a whole number or a name, that is the region of the triangles in a polygon")
       ->type_name("NAME");
   command
       .add_option("--id-column", reading_.id_column,
@@ -62,7 +63,7 @@ void DomainOptions::AddReadingTo(CLI::App& command, const std::string& what) {
       ->type_name("COLUMN");
   command
       .add_option("--marker-property", reading_.marker_property,
-                  "Of .geojson: the property, a whole number, that marks the boundary of a feature")
+                  "Of .geojson: the property, a whole number or a name, that marks the boundary of a feature")
       ->type_name("NAME");
 }
 

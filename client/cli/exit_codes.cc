@@ -3,7 +3,7 @@
 #include <iostream>
 #include <string>
 
-#include "client/cli/json.h"
+#include "client/json/json.h"
 #include "client/printable.h"
 
 namespace wellspace::cli {
@@ -52,7 +52,7 @@ int ReportError(const absl::Status& status, OutputFormat format) {
     std::cerr << "wellspace: " << client::Printable(std::string(status.message())) << " [" << code << "]\n";
     return ExitCodeOf(status);
   }
-  std::cerr << JsonText({{"error", ErrorJson(status)}}, /*indented=*/false) << "\n";
+  std::cerr << client::JsonText({{"error", client::ErrorJson(status)}}, /*indented=*/false) << "\n";
   return ExitCodeOf(status);
 }
 

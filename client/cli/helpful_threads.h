@@ -1,4 +1,4 @@
-// How many threads a mesh is worth.
+// The number of threads that helps a mesh.
 #ifndef WELLSPACE_CLIENT_CLI_HELPFUL_THREADS_H_
 #define WELLSPACE_CLIENT_CLI_HELPFUL_THREADS_H_
 

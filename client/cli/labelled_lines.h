@@ -7,7 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "client/cli/json.h"
+#include "client/json/json.h"
 
 namespace wellspace::cli {
 
@@ -17,9 +17,9 @@ inline void PrintLine(const std::string& label, const std::string& text) {
 }
 
 // "0, 0.5, 1"
-inline std::string Numbers(const Json& numbers) {
+inline std::string Numbers(const client::Json& numbers) {
   std::string text;
-  for (const Json& number : numbers) {
+  for (const client::Json& number : numbers) {
     absl::StrAppend(&text, text.empty() ? "" : ", ", absl::StrFormat("%.9g", number.get<double>()));
   }
   return text;

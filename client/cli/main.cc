@@ -1,4 +1,4 @@
-// wellspace: meshes of point clouds and of domains in the plane from the command line.
+// wellspace: meshes of point clouds and of domains in the plane and in space from the command line.
 #include <CLI/CLI.hpp>
 #include <csignal>
 #include <cstdlib>
@@ -19,7 +19,7 @@ int main(int argc, char** argv) {
   std::signal(SIGPIPE, SIG_IGN);                      // a closed pipe is an error of writing, which is reported,
   std::signal(SIGXFSZ, SIG_IGN);                      // and so is the limit of a file's size
   setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);  // errors of connections are told by the commands
-  CLI::App app("Quality simplicial meshes of point clouds and of domains in the plane", "wellspace");
+  CLI::App app("Quality simplicial meshes of point clouds and of domains in the plane and in space", "wellspace");
   app.set_version_flag("--version", std::string("wellspace ") + WELLSPACE_VERSION);
   app.require_subcommand(1);
   app.footer(kExitCodesHelp);

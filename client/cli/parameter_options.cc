@@ -1,8 +1,10 @@
 #include "client/cli/parameter_options.h"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <tuple>
 #include <utility>
@@ -10,20 +12,20 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
-#include "client/cli/json.h"
 #include "client/cli/length.h"
 #include "client/cli/options.h"
 #include "client/cli/size_field_options.h"
 #include "client/error_details.h"
 #include "client/formats/cloud.h"
 #include "client/formats/io/number.h"
+#include "client/json/json.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::cli {
 namespace {
 
-constexpr client::Criterion kRadiusEdge = client::Criterion::kRadiusEdge;
-constexpr client::Criterion kWellSpaced = client::Criterion::kWellSpaced;
+// Those that can be asked for.
+constexpr std::array kCriteria = {client::Criterion::kRadiusEdge, client::Criterion::kWellSpaced};
 constexpr char kPeriodic[] = "--periodic";
 constexpr std::string_view kPeriodicAxes = "periodic_axes";
 constexpr std::string_view kAxes = "xyz";
@@ -44,16 +46,18 @@ std::string Text(const std::vector<double>& numbers) { return absl::StrJoin(numb
 }  // namespace
 
 CLI::Option* AddCriterion(CLI::App& command, client::Criterion& criterion) {
+  std::vector<std::string> names;
+  std::ranges::transform(kCriteria, std::back_inserter(names), client::CriterionName);
   return command
       .add_option_function<std::string>(
           "--criterion",
           [&criterion](const std::string& name) {
-            criterion = name == CriterionName(kWellSpaced) ? kWellSpaced : kRadiusEdge;
+            criterion = *std::ranges::find(kCriteria, name, client::CriterionName);  // which ->check() has found
           },
           "What --rho bounds: radius-edge, circumradius / shortest edge of every simplex; or well-spaced, for every "
           "vertex the farthest node of its Voronoi cell / its nearest neighbour, which is stronger; default: "
           "radius-edge")
-      ->check(CLI::IsMember({CriterionName(kRadiusEdge), CriterionName(kWellSpaced)}));
+      ->check(CLI::IsMember(names));
 }
 
 void AddSizes(CLI::App& command, std::optional<double>& max_circumradius,

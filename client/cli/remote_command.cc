@@ -20,7 +20,9 @@ void AddOutput(CLI::App& command, OutputFormat& format) {
       ->check(CLI::IsMember({"text", "json"}));
 }
 
-void PrintJson(const Json& json, bool indented) { std::cout << JsonText(json, indented) << "\n" << std::flush; }
+void PrintJson(const client::Json& json, bool indented) {
+  std::cout << client::JsonText(json, indented) << "\n" << std::flush;
+}
 
 // The server knows points by their index; the author of the file knows them by their line.
 absl::Status WithOrigins(const absl::Status& status, uint64_t first_index, uint64_t count,

@@ -10,11 +10,11 @@
 #include "absl/status/status.h"
 #include "client/cli/exit_codes.h"
 #include "client/cli/interrupt.h"
-#include "client/cli/json.h"
 #include "client/cli/server_link.h"
 #include "client/client.h"
 #include "client/formats/cloud.h"
 #include "client/formats/file_plan.h"
+#include "client/json/json.h"
 
 namespace wellspace::cli {
 
@@ -22,7 +22,7 @@ namespace wellspace::cli {
 void AddOutput(CLI::App& command, OutputFormat& format);
 
 // Prints `json` on standard output, in one line or indented.
-void PrintJson(const Json& json, bool indented = true);
+void PrintJson(const client::Json& json, bool indented = true);
 
 // `status`, with the file and the line of each point that the server names by its index; those of the file are `count`
 // from `first_index` on, and `origin` tells where each was read.

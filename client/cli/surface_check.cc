@@ -47,12 +47,12 @@ core::SolidParts PartsOf(const formats::Mesh& mesh, const std::vector<int32_t>& 
   return parts;
 }
 
-Json ReportJson(const core::SolidMeshReport& report) {
-  Json volumes = Json::array();
+client::Json ReportJson(const core::SolidMeshReport& report) {
+  client::Json volumes = client::Json::array();
   for (const auto& [region, volume] : report.volumes) {
     volumes.push_back({{"id", region}, {"volume", volume}});
   }
-  Json areas = Json::array();
+  client::Json areas = client::Json::array();
   for (const auto& [tag, area] : report.areas) {
     areas.push_back({{"tag", tag}, {"area", area}});
   }
@@ -61,7 +61,7 @@ Json ReportJson(const core::SolidMeshReport& report) {
           {"open_edges", report.open_edges}, {"over_rho", report.over_rho}};
 }
 
-Json DeviationJson(const core::Deviation& deviation, double diagonal) {
+client::Json DeviationJson(const core::Deviation& deviation, double diagonal) {
   return {{"found", deviation.found},
           {"share", deviation.found / diagonal},
           {"at_most", deviation.at_most},
@@ -108,7 +108,7 @@ void SurfaceCheck::AddTo(CLI::App& command) {
   }
   AddLength(command, "--tolerance", tolerance_,
             absl::StrCat("How far facets may be from the surface, and it from them: a length, or with % a share of the "
-                         "diagonal; default ",
+                         "diagonal; default: ",
                          kDefaultTolerance, "%"),
             Length::Whole::kDiagonal)
       ->needs("--surface");
@@ -119,7 +119,7 @@ void SurfaceCheck::AddFilesTo(formats::FilePlan& files) const {
   options_.AddFilesTo(files);
 }
 
-absl::Status SurfaceCheck::Check(const formats::Mesh& mesh, double rho, OutputFormat format, Json& json) const {
+absl::Status SurfaceCheck::Check(const formats::Mesh& mesh, double rho, OutputFormat format, client::Json& json) const {
   if (mesh.dimension != 3) {
     return absl::InvalidArgumentError(
         absl::StrCat("--surface: the mesh has dimension ", mesh.dimension, "; expected tetrahedra"));
@@ -145,7 +145,7 @@ absl::Status SurfaceCheck::Check(const formats::Mesh& mesh, double rho, OutputFo
 }
 
 absl::Status SurfaceCheck::Compare(const core::MeshView& view, const core::SolidParts& parts, OutputFormat format,
-                                   Json& json) const {
+                                   client::Json& json) const {
   WELLSPACE_ASSIGN_OR_RETURN(const formats::Surface surface, options_.Read(path_, {}));
   core::SurfaceFeatures features = options_.FeaturesOf(surface);
   const std::vector<core::SolidSeed> seeds = SeedsOf(surface);

@@ -8,11 +8,11 @@
 
 #include "absl/status/status.h"
 #include "client/cli/cloud_options.h"
-#include "client/cli/json.h"
 #include "client/cli/length.h"
 #include "client/cli/surface_options.h"
 #include "client/formats/file_plan.h"
 #include "client/formats/mesh.h"
+#include "client/json/json.h"
 #include "core/validate/validate_solid.h"
 
 namespace wellspace::cli {
@@ -33,11 +33,11 @@ class SurfaceCheck {
   //
   // Errors:     FAILED_PRECONDITION, naming the first violation; INVALID_ARGUMENT for a surface that cannot be read, or
   //             has faults.
-  absl::Status Check(const formats::Mesh& mesh, double rho, OutputFormat format, Json& json) const;
+  absl::Status Check(const formats::Mesh& mesh, double rho, OutputFormat format, client::Json& json) const;
 
  private:
   absl::Status Compare(const core::MeshView& view, const core::SolidParts& parts, OutputFormat format,
-                       Json& json) const;
+                       client::Json& json) const;
 
   std::string path_;
   SurfaceOptions options_;

@@ -12,7 +12,7 @@
 namespace wellspace::cli {
 namespace {
 
-Json PartsJson(const formats::Surface& surface) {
+client::Json PartsJson(const formats::Surface& surface) {
   std::map<int32_t, uint64_t> sizes;
   for (const int32_t marker : surface.markers) {
     ++sizes[marker];
@@ -21,7 +21,7 @@ Json PartsJson(const formats::Surface& surface) {
   for (const formats::Surface::Part& part : surface.parts) {
     names[part.marker] = part.name;
   }
-  Json parts = Json::array();
+  client::Json parts = client::Json::array();
   for (const auto& [marker, size] : sizes) {
     parts.push_back({{"tag", marker}, {"name", names[marker]}, {"triangles", size}});
   }
@@ -29,14 +29,14 @@ Json PartsJson(const formats::Surface& surface) {
 }
 
 // "length" of a loop, "distance" of a point, as the kind has it.
-Json PlaceJson(const formats::Surface& surface, core::SurfaceFault::Kind kind, const core::FaultPlace& place) {
-  Json json = {{"at", place.at}};
+client::Json PlaceJson(const formats::Surface& surface, core::SurfaceFault::Kind kind, const core::FaultPlace& place) {
+  client::Json json = {{"at", place.at}};
   if (kind == core::SurfaceFault::Kind::kOpenEdges) {
     json["length"] = place.size;
   } else if (kind == core::SurfaceFault::Kind::kNearPoints) {
     json["distance"] = place.size;
   }
-  json["triangles"] = Json::array();
+  json["triangles"] = client::Json::array();
   for (const uint32_t triangle : place.triangles) {
     json["triangles"].push_back(surface.TriangleOrigin(triangle));
   }
@@ -44,20 +44,20 @@ Json PlaceJson(const formats::Surface& surface, core::SurfaceFault::Kind kind, c
 }
 
 // Where one of the triangles is that were dropped, or go against others; null without any.
-Json ExampleJson(const formats::Surface& surface, const core::FaultPlace& place) {
+client::Json ExampleJson(const formats::Surface& surface, const core::FaultPlace& place) {
   return place.triangles.empty()
-             ? Json(nullptr)
-             : Json{{"at", place.at}, {"triangle", surface.TriangleOrigin(place.triangles.front())}};
+             ? client::Json(nullptr)
+             : client::Json{{"at", place.at}, {"triangle", surface.TriangleOrigin(place.triangles.front())}};
 }
 
-Json FaultsJson(const formats::Surface& surface, const core::SurfaceReport& report) {
-  Json faults = Json::array();
+client::Json FaultsJson(const formats::Surface& surface, const core::SurfaceReport& report) {
+  client::Json faults = client::Json::array();
   for (const core::SurfaceFault& fault : report.faults) {
-    Json json = {{"kind", core::NameOf(fault.kind)}, {"count", fault.count}, {"at_least", fault.has_more}};
+    client::Json json = {{"kind", core::NameOf(fault.kind)}, {"count", fault.count}, {"at_least", fault.has_more}};
     if (fault.kind == core::SurfaceFault::Kind::kOpenEdges) {
       json["loops"] = fault.loops;
     }
-    json["places"] = Json::array();
+    json["places"] = client::Json::array();
     for (const core::FaultPlace& place : fault.places) {
       json["places"].push_back(PlaceJson(surface, fault.kind, place));
     }
@@ -74,7 +74,7 @@ std::string Counted(uint64_t count, const std::string& what) {
 
 std::string Patches(uint64_t count) { return absl::StrCat(WithThousands(count), count == 1 ? " patch" : " patches"); }
 
-void PrintChanges(const Json& json) {
+void PrintChanges(const client::Json& json) {
   const auto count = [&json](const char* name) { return json[name].get<uint64_t>(); };
   if (count("welded_points") > 0) {
     PrintLine("welded", absl::StrFormat("%s, within %.3g of another one", Counted(count("welded_points"), "point"),
@@ -82,7 +82,7 @@ void PrintChanges(const Json& json) {
   }
   // "at (0, 0, 1): part.off:17", and if there are more "such as at …".
   const auto example = [&](const char* kind) {
-    const Json& place = json[absl::StrCat(kind, "_example")];
+    const client::Json& place = json[absl::StrCat(kind, "_example")];
     return absl::StrCat(count(absl::StrCat(kind, "_triangles").c_str()) > 1 ? ", such as at (" : ", at (",
                         Numbers(place["at"]), "): ", place["triangle"].get<std::string>());
   };
@@ -109,7 +109,7 @@ void PrintChanges(const Json& json) {
   }
 }
 
-void PrintFault(const Json& fault) {
+void PrintFault(const client::Json& fault) {
   const uint64_t count = fault["count"];
   std::string kind = fault["kind"];
   for (char& c : kind) {
@@ -119,7 +119,7 @@ void PrintFault(const Json& fault) {
             absl::StrCat(
                 kind, ": ", fault["at_least"].get<bool>() ? "at least " : "", WithThousands(count),
                 fault.contains("loops") ? absl::StrCat(" in ", Counted(fault["loops"].get<uint64_t>(), "loop")) : ""));
-  for (const Json& place : fault["places"]) {
+  for (const client::Json& place : fault["places"]) {
     std::string text = absl::StrCat("at (", Numbers(place["at"]), ")");
     if (place.contains("length")) {
       absl::StrAppend(&text, absl::StrFormat(", a loop %.4g long", place["length"].get<double>()));
@@ -145,9 +145,9 @@ void PrintFault(const Json& fault) {
 
 }  // namespace
 
-Json SurfaceJson(const std::string& path, const formats::Surface& surface, const core::SurfaceFeatures& features,
-                 const core::SurfaceReport& report) {
-  Json json;
+client::Json SurfaceJson(const std::string& path, const formats::Surface& surface,
+                         const core::SurfaceFeatures& features, const core::SurfaceReport& report) {
+  client::Json json;
   json["file"] = path;
   json["kind"] = "surface";
   json["format"] = surface.format;
@@ -172,19 +172,21 @@ Json SurfaceJson(const std::string& path, const formats::Surface& surface, const
   json["components"] = report.components;
   json["area"] = report.area;
   json["lost_area"] = report.lost_area;
-  json["volume"] = report.volume.has_value() ? Json(*report.volume) : Json(nullptr);
-  json["solids"] = report.volume.has_value() ? Json(report.solids) : Json(nullptr);
-  json["membranes"] = report.volume.has_value() ? Json(report.membranes) : Json(nullptr);
+  json["volume"] = report.volume.has_value() ? client::Json(*report.volume) : client::Json(nullptr);
+  json["solids"] = report.volume.has_value() ? client::Json(report.solids) : client::Json(nullptr);
+  json["membranes"] = report.volume.has_value() ? client::Json(report.membranes) : client::Json(nullptr);
   json["curves"] = report.curves;
   json["corners"] = report.corners;
   json["patches"] = report.patches;
-  json["sharpest_angle_deg"] = report.sharpest_angle_deg.has_value() ? Json(*report.sharpest_angle_deg) : Json(nullptr);
-  json["sharpest_at"] = report.sharpest_angle_deg.has_value() ? Json(report.sharpest_at) : Json(nullptr);
+  json["sharpest_angle_deg"] =
+      report.sharpest_angle_deg.has_value() ? client::Json(*report.sharpest_angle_deg) : client::Json(nullptr);
+  json["sharpest_at"] =
+      report.sharpest_angle_deg.has_value() ? client::Json(report.sharpest_at) : client::Json(nullptr);
   json["faults"] = FaultsJson(surface, report);
   return json;
 }
 
-void PrintSurface(const Json& json) {
+void PrintSurface(const client::Json& json) {
   PrintLine("file", json["file"]);
   PrintLine("kind", absl::StrCat("surface, ", std::string(json["format"]), ", 3-D"));
   PrintLine("triangles", WithThousands(json["triangles"]));
@@ -192,7 +194,7 @@ void PrintSurface(const Json& json) {
   PrintLine("from", Numbers(json["low"]));
   PrintLine("to", Numbers(json["high"]));
   if (json["parts"].size() > 1 || json["parts"][0]["tag"] != 0) {
-    for (const Json& part : json["parts"]) {
+    for (const client::Json& part : json["parts"]) {
       const std::string name = part["name"];
       PrintLine("part", absl::StrCat(part["tag"].get<int32_t>(), name.empty() ? "" : " ", name, ": ",
                                      Counted(part["triangles"], "triangle")));
@@ -223,7 +225,7 @@ void PrintSurface(const Json& json) {
     PrintLine("sharpest angle", absl::StrFormat("%.6g\u00b0 at (%s)", json["sharpest_angle_deg"].get<double>(),
                                                 Numbers(json["sharpest_at"])));
   }
-  for (const Json& fault : json["faults"]) {
+  for (const client::Json& fault : json["faults"]) {
     PrintFault(fault);
   }
   if (json["faults"].empty()) {

@@ -4,8 +4,8 @@
 
 #include <string>
 
-#include "client/cli/json.h"
 #include "client/formats/surface/surface.h"
+#include "client/json/json.h"
 #include "core/input/surface_report.h"
 
 namespace wellspace::cli {
@@ -14,11 +14,11 @@ namespace wellspace::cli {
 // flat_triangles, flat_example, equal_triangles, equal_example, flipped_triangles, flipped_example, one_sided,
 // inside_out, loose_points, components, area, lost_area, volume, solids, membranes, curves, corners, patches,
 // sharpest_angle_deg, sharpest_at, faults. Values that faults leave open are null.
-Json SurfaceJson(const std::string& path, const formats::Surface& surface, const core::SurfaceFeatures& features,
-                 const core::SurfaceReport& report);
+client::Json SurfaceJson(const std::string& path, const formats::Surface& surface,
+                         const core::SurfaceFeatures& features, const core::SurfaceReport& report);
 
 // The same for a user, a line each, on standard output.
-void PrintSurface(const Json& json);
+void PrintSurface(const client::Json& json);
 
 }  // namespace wellspace::cli
 

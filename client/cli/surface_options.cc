@@ -42,12 +42,12 @@ void SurfaceOptions::AddTo(CLI::App& command, const std::string& what) {
       ->check(CLI::IsMember({kEvenOdd, kHoles, kWinding}));
   AddLength(command, "--resolution", resolution_,
             "With --solids winding: side of the cells in which what is meshed is looked for: a length, or with % a "
-            "share of the diagonal; default 0.5%",
+            "share of the diagonal; default: 0.5%",
             Length::Whole::kDiagonal);
   command
       .add_option("--crease-angle", crease_angle_,
                   "Edges with more than this angle between the normals of their triangles are creases; 180: none; "
-                  "default 30")
+                  "default: 30")
       ->type_name("DEGREES")
       ->check(CLI::Range(0.0, 180.0));
   AddLength(command, "--weld", weld_,

@@ -61,7 +61,7 @@
 // Of a mesh with periodic axes each vertex on the low side across one has its partner on the high side. msh41, msh22:
 // $Periodic, of the entity of each high side its nodes, the low side's, and the translation; they go with the boundary,
 // which has these entities. npz: `periodic_x`, `periodic_y`, `periodic_z`, a row for each pair, the vertex of the low
-// side first, by ascending such. Middle nodes of second order are paired as well.
+// side first, ascending by it. Middle nodes of second order are paired as well.
 //
 // Edges along the creases of a surface are `ridges` of npz, and Edges that Ridges names of medit.
 //

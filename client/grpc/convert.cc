@@ -239,12 +239,26 @@ void SetSurface(const SurfaceParameters& surface, v1::MeshParameters* parameters
 
 v1::Criterion CriterionToProto(Criterion criterion) {
   switch (criterion) {
+    case Criterion::kRadiusEdge:
+      return v1::CRITERION_RADIUS_EDGE;
     case Criterion::kWellSpaced:
       return v1::CRITERION_WELL_SPACED;
-    case Criterion::kRadiusEdge:
+    case Criterion::kUnknown:
       break;
   }
-  return v1::CRITERION_RADIUS_EDGE;
+  return static_cast<v1::Criterion>(-1);  // refused, rather than taken for the default
+}
+
+Criterion CriterionFromProto(v1::Criterion criterion) {
+  switch (criterion) {
+    case v1::CRITERION_UNSPECIFIED:
+    case v1::CRITERION_RADIUS_EDGE:
+      return Criterion::kRadiusEdge;
+    case v1::CRITERION_WELL_SPACED:
+      return Criterion::kWellSpaced;
+    default:
+      return Criterion::kUnknown;  // of a newer server
+  }
 }
 
 }  // namespace
@@ -293,8 +307,7 @@ MeshOptions OptionsFromProto(const v1::MeshParameters& parameters) {
   MeshOptions options;
   options.dimension = parameters.dimension();
   options.rho = get(parameters.has_rho(), parameters.rho());
-  options.criterion =
-      parameters.criterion() == v1::CRITERION_WELL_SPACED ? Criterion::kWellSpaced : Criterion::kRadiusEdge;
+  options.criterion = CriterionFromProto(parameters.criterion());
   options.max_circumradius = get(parameters.has_max_circumradius(), parameters.max_circumradius());
   options.edge_length = get(parameters.has_edge_length(), parameters.edge_length());
   options.gradation = get(parameters.has_gradation(), parameters.gradation());

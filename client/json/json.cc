@@ -34,12 +34,13 @@ const char* StateName(SessionState state) {
 
 const char* CriterionName(Criterion criterion) {
   switch (criterion) {
+    case Criterion::kRadiusEdge:
+      return "radius-edge";
     case Criterion::kWellSpaced:
       return "well-spaced";
-    case Criterion::kRadiusEdge:
-      break;
+    default:
+      return "unknown";  // of a newer server
   }
-  return "radius-edge";
 }
 
 const char* StateName(OperationState state) {

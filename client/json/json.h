@@ -19,11 +19,13 @@ std::string JsonText(const Json& json, bool indented);
 
 // code, reason and field (where the server gave one), message.
 Json ErrorJson(const absl::Status& status);
-// dimension, rho, criterion, max_circumradius, edge_length, gradation, size_boxes, min_dihedral, pump_weights,
-// keep_vertices, domain_low, domain_high, margin, merge_distance, periodic_axes, max_vertices, threads.
+// dimension, rho, criterion, max_circumradius, edge_length, gradation, size_boxes, min_dihedral, surface (the fields of
+// SurfaceParameters), pump_weights, keep_vertices, domain_low, domain_high, margin, merge_distance, periodic_axes,
+// max_vertices, threads.
 Json ParametersJson(const MeshOptions& parameters);
 // name, state, parameters, labels, ttl_seconds, create_time, expire_time, revision, committed_points, segment_count,
-// seed_count, faces (a name, or null for a cloud), crossings (likewise), size_count, stored_bytes, vertex_count,
+// seed_count, faces (a name, or null without segments), crossings (likewise), snap_distance, triangle_count, solids (a
+// name, or null without triangles), crease_angle and weld (likewise), size_count, stored_bytes, vertex_count,
 // simplex_count, last_operation.
 Json SessionJson(const Session& session);
 // sequence, phase, vertices, estimated_vertices, simplices, fraction.

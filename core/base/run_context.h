@@ -54,7 +54,8 @@ class RunContext {
   RunContext(const RunContext&) = delete;
   RunContext& operator=(const RunContext&) = delete;
 
-  // Asks the run to stop. The run then returns `Cancelled` or `DeadlineExceeded`.
+  // Asks the run to stop. The run then returns `Cancelled` or `DeadlineExceeded`. The second is for owners with a
+  // deadline of their own: a call of the server whose deadline passes ends by itself, and cancels its run.
   void Cancel();
   void ExceedDeadline();
 

@@ -1,4 +1,4 @@
-// How long something takes.
+// A stopwatch, which measures times of work.
 #ifndef WELLSPACE_CORE_BASE_STOPWATCH_H_
 #define WELLSPACE_CORE_BASE_STOPWATCH_H_
 

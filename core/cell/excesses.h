@@ -1,5 +1,5 @@
-// How far the nodes of a cell are beyond a bisector, from 4-D on: NodeColumns::ComputeExcesses, the filter before exact
-// decisions. Apart from node_columns.h since it is compiled into polytope.cc alone, once for each vector unit.
+// Excesses of nodes of a cell over a bisector, from 4-D on: NodeColumns::ComputeExcesses, the filter before exact
+// decisions. It is apart from node_columns.h since polytope.cc alone compiles it, once for each vector unit.
 #ifndef WELLSPACE_CORE_CELL_EXCESSES_H_
 #define WELLSPACE_CORE_CELL_EXCESSES_H_
 

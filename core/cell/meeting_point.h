@@ -1,4 +1,4 @@
-// Where D planes meet, in doubles, and how far that may be from where they meet exactly: Place computes it for each
+// Meeting points of D planes in doubles, and bounds on their distances from the exact ones: Place computes one for each
 // node.
 //
 //   PlaceNode, PlaceByPlanes   called by cells: Meet, or ExactMeetingPoint where its bound is not good enough

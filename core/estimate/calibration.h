@@ -1,4 +1,5 @@
-// How many vertices refinement adds, by integrals of the local feature size: the model of docs/design/estimate.md.
+// The expected number of vertices that refinement adds, by integrals of the local feature size: the model of
+// docs/design/estimate.md.
 #ifndef WELLSPACE_CORE_ESTIMATE_CALIBRATION_H_
 #define WELLSPACE_CORE_ESTIMATE_CALIBRATION_H_
 

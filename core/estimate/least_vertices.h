@@ -1,5 +1,5 @@
-// How many vertices a mesh has at least, by proof, and about, by a formula: a hopeless demand is refused before any
-// work.
+// Numbers of vertices of a mesh: the least one, by proof, and the expected one, by a formula. A hopeless demand is
+// refused before any work.
 #ifndef WELLSPACE_CORE_ESTIMATE_LEAST_VERTICES_H_
 #define WELLSPACE_CORE_ESTIMATE_LEAST_VERTICES_H_
 

@@ -1,4 +1,4 @@
-// How many simplices and bytes a mesh will have, by its vertices and the leaves of its tree.
+// Expected numbers of simplices and bytes of a mesh, by its vertices and the leaves of its tree.
 #ifndef WELLSPACE_CORE_ESTIMATE_MESH_SIZE_H_
 #define WELLSPACE_CORE_ESTIMATE_MESH_SIZE_H_
 

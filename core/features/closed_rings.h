@@ -1,4 +1,4 @@
-// Whether rings of segments are closed. Private to core/features.
+// The check that rings of segments are closed. Private to core/features.
 #ifndef WELLSPACE_CORE_FEATURES_CLOSED_RINGS_H_
 #define WELLSPACE_CORE_FEATURES_CLOSED_RINGS_H_
 

@@ -1,4 +1,4 @@
-// Where segments of the plane meet each other and points, and the faults there.
+// Contacts of segments in the plane with each other and with points, and the faults there.
 #ifndef WELLSPACE_CORE_FEATURES_CROSSING_SEGMENTS_H_
 #define WELLSPACE_CORE_FEATURES_CROSSING_SEGMENTS_H_
 

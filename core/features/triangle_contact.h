@@ -1,4 +1,4 @@
-// Whether two triangles of a complex meet where they share nothing, or come too near to each other.
+// The test of two triangles of a complex for contact: they meet where they share nothing, or come too near.
 #ifndef WELLSPACE_CORE_FEATURES_TRIANGLE_CONTACT_H_
 #define WELLSPACE_CORE_FEATURES_TRIANGLE_CONTACT_H_
 

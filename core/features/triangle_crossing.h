@@ -1,4 +1,4 @@
-// Where segments cross triangles, with all ties broken for good.
+// Crossings of segments with triangles, with all ties broken for good.
 #ifndef WELLSPACE_CORE_FEATURES_TRIANGLE_CROSSING_H_
 #define WELLSPACE_CORE_FEATURES_TRIANGLE_CROSSING_H_
 

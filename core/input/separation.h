@@ -1,5 +1,5 @@
-// Whether the points of a cloud are as far from each other as the arithmetic wants (Frame::MinSeparation). Called once
-// the tree is built, which finds near points; points of one cube of its grid are refused before, by SortCloud.
+// The check that the points of a cloud are as far from each other as the arithmetic wants (Frame::MinSeparation). It is
+// made once the tree is built, which finds near points. SortCloud has refused points of one cube of its grid before.
 #ifndef WELLSPACE_CORE_INPUT_SEPARATION_H_
 #define WELLSPACE_CORE_INPUT_SEPARATION_H_
 

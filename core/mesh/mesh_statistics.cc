@@ -23,7 +23,7 @@ void SetQueryFigures(const QueryCounters& cells, const QueryCounters& stars, Mes
 }
 
 void SetSliverFigures(const SliverStatistics& slivers, MeshStatistics& statistics) {
-  statistics.slivers_are_asked_about = slivers.is_asked;
+  statistics.slivers_wanted = slivers.slivers_wanted;
   statistics.slivers = slivers.slivers;
   statistics.slivers_left = slivers.slivers_left;
   statistics.slivers_left_by = slivers.left_by;

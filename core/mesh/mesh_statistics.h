@@ -68,10 +68,9 @@ struct MeshStatistics {
   double min_angle_deg = 0;  // 2-D: smallest angle of a triangle; 3-D: smallest dihedral angle of a tetrahedron
 
   // Slivers are tetrahedra below min_dihedral. With no weighted vertices the mesh is Delaunay, and keeps the criterion.
-  bool slivers_are_asked_about =
-      false;                  // whether they were to be repaired or pumped away; the figures below are then true
-  uint64_t slivers = 0;       // that were found, new ones of later refinements included
-  uint64_t slivers_left = 0;  // that could not be repaired
+  bool slivers_wanted = false;  // whether they were to be repaired or pumped away; the figures below are then true
+  uint64_t slivers = 0;         // that were found, new ones of later refinements included
+  uint64_t slivers_left = 0;    // that could not be repaired
   std::array<uint64_t, kSliverReasons> slivers_left_by{};  // by SliverReason; together slivers_left
   std::vector<LeftSliver> flattest_left;                   // of these at most kMostNamedSlivers, flattest first
   uint64_t sliver_operations = 0;                          // tetrahedra that the repair measured, or held a vertex to

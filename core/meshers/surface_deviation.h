@@ -1,5 +1,5 @@
-// How far the facets of a mesh and the surface that they stand for are from each other. SpaceMesher sets statistics by
-// it, and adds vertices where the surface is too far from all facets.
+// Distances between the facets of a mesh and the surface that they stand for. SpaceMesher sets statistics by them, and
+// adds vertices where the surface is too far from all facets.
 #ifndef WELLSPACE_CORE_MESHERS_SURFACE_DEVIATION_H_
 #define WELLSPACE_CORE_MESHERS_SURFACE_DEVIATION_H_
 

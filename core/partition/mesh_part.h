@@ -57,7 +57,7 @@ struct MeshPart {
   HugeVector<uint32_t> facet_corners;    // rows of dimension
 };
 
-// What a part has of the whole mesh, marked there.
+// A part of a mesh, marked in the whole mesh.
 struct PartSelection {
   uint32_t part = 0;
   HugeVector<uint16_t> layer_of;   // by simplex: 0 of the part itself, 1, 2, … of its ghosts, kNoLayer of others

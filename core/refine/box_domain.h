@@ -22,6 +22,7 @@ namespace wellspace::core {
 // A domain is the meshed part of the box of a structure. Refinement and Rounds are templates on it, and know it by the
 // names below alone; a domain pays for none that it does not need. A kind is a folder beside core/refine/plane, its
 // name where refine.cc, rounds.cc and mesher_of.cc are instantiated, its MesherOf, and a branch of Mesher::Create.
+// Where slivers are repaired, sliver_stage.cc is instantiated for it, with its carrier.
 //
 //   kDimension         int: of its points.
 //   Place              The place of a new vertex, beside its position; Nowhere shows the functions.

@@ -1,4 +1,4 @@
-// How the checking build asserts: the switch and the abort. Its assertions are in refinement_checks.h.
+// The switch of the checking build, and its abort. Its assertions are in refinement_checks.h.
 #ifndef WELLSPACE_CORE_REFINE_CHECKS_H_
 #define WELLSPACE_CORE_REFINE_CHECKS_H_
 

@@ -1,4 +1,4 @@
-// How large simplices may be, and where.
+// Size fields: the bound on circumradii at each point, from boxes and samples.
 #ifndef WELLSPACE_CORE_REFINE_SIZING_H_
 #define WELLSPACE_CORE_REFINE_SIZING_H_
 

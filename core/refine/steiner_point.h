@@ -1,4 +1,4 @@
-// Where a new vertex goes: circumcentre, off-centre or farther in a petal, and its place on the boundary of the box.
+// Steiner points: circumcentre, off-centre or farther in a petal, and their places on the boundary of the box.
 #ifndef WELLSPACE_CORE_REFINE_STEINER_POINT_H_
 #define WELLSPACE_CORE_REFINE_STEINER_POINT_H_
 

@@ -1,4 +1,4 @@
-// How a step follows from a cell: its fault, where a new vertex goes, and the notices to its neighbours.
+// Rules by which a step follows from a cell: its fault, the place of a new vertex, and the notices to its neighbours.
 // CellSteps asks in each step of a vertex in the box; PlaneRules takes clip and candidates from here.
 #ifndef WELLSPACE_CORE_REFINE_STEP_RULES_H_
 #define WELLSPACE_CORE_REFINE_STEP_RULES_H_

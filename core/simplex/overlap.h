@@ -1,4 +1,4 @@
-// How much of one simplex lies in another.
+// The part of one simplex that lies in another, by volume.
 #ifndef WELLSPACE_CORE_SIMPLEX_OVERLAP_H_
 #define WELLSPACE_CORE_SIMPLEX_OVERLAP_H_
 

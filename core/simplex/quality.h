@@ -1,4 +1,4 @@
-// How good one simplex is: its radius-edge ratio and its angles.
+// The quality of one simplex: its radius-edge ratio and its angles.
 #ifndef WELLSPACE_CORE_SIMPLEX_QUALITY_H_
 #define WELLSPACE_CORE_SIMPLEX_QUALITY_H_
 

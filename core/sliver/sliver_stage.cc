@@ -215,7 +215,7 @@ absl::Status SliverStage<D>::Repair(QueryStructure<3>& structure, Refinement<Dom
                                     std::vector<bool>& moved, int threads,
                                     RunContext& context) requires(D == 3 && Domain::kDimension == 3) {
   const Stopwatch stopwatch(statistics_.seconds, statistics_.star_seconds);
-  statistics_.is_asked = true;
+  statistics_.slivers_wanted = true;
   WELLSPACE_RETURN_IF_ERROR(FollowStructure(structure, refinement.stars(), threads, context));
   context.EnterPhase(Phase::kSlivers);
   Follower<Domain> follower(*triangulation_, structure, refinement, moved);
@@ -242,7 +242,7 @@ absl::StatusOr<WeightedSimplices> SliverStage<D>::ToSimplices(const QueryStructu
   const Stopwatch stopwatch(statistics_.seconds, statistics_.star_seconds);
   WeightedSimplices out;
   statistics_.weighted = 0;
-  statistics_.is_asked = statistics_.is_asked || pump;
+  statistics_.slivers_wanted = statistics_.slivers_wanted || pump;
   if (!pump) {
     context.EnterPhase(Phase::kSlivers);
   }

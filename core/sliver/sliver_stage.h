@@ -27,8 +27,8 @@ struct SliverStatistics {
   // Of `slivers_left`: see RepairReport.
   std::array<uint64_t, kSliverReasons> left_by{};
   std::vector<LeftSliver> flattest_left;
-  uint64_t operations = 0;  // of Repair
-  bool is_asked = false;    // whether a mesh was to be repaired or pumped
+  uint64_t operations = 0;      // of Repair
+  bool slivers_wanted = false;  // whether a mesh was to be repaired or pumped
   uint64_t moves = 0;
   uint64_t added = 0;
   uint64_t weighted = 0;                // vertices with a weight in the last mesh

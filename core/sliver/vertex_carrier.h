@@ -1,4 +1,4 @@
-// Where the vertices of a mesh may go while it is repaired, and the carrier of a cloud's mesh: the box.
+// Carriers, which say where vertices of a mesh may go while it is repaired; and that of a cloud's mesh, the box.
 #ifndef WELLSPACE_CORE_SLIVER_VERTEX_CARRIER_H_
 #define WELLSPACE_CORE_SLIVER_VERTEX_CARRIER_H_
 

@@ -76,7 +76,6 @@ absl::Status LeafTree<D>::Build(const MortonGrid<D>& grid, std::span<const Point
                                 int threads, const RunContext& context, std::vector<SegmentLists::Ends> segments) {
   box_ = grid.box();
   segments_.Begin(std::move(segments));
-  surface_nodes_ = {};
   max_level_ = static_cast<uint8_t>(grid.levels());
   sides_ = grid.Sides();
   points_ = points;
@@ -160,16 +159,6 @@ absl::Status LeafTree<D>::FillLeaves(int threads, const RunContext& context) {
     return context.Check();
   };
   return ThreadTeam(threads).TryForEach(blocks, fill);
-}
-
-template <int D>
-void LeafTree<D>::FollowSurface(const SurfaceIndex& index) requires(D == 3) {
-  surface_nodes_.Begin(index);  // of the root; nodes are numbered after their parents
-  for (uint32_t i = 0; i < node_count(); ++i) {
-    if (At(NodeId{i}).first_child != kNoNode) {
-      surface_nodes_.HandDown(NodeId{i}, level(NodeId{i}), At(NodeId{i}).first_child);
-    }
-  }
 }
 
 template <int D>
@@ -281,9 +270,6 @@ void LeafTree<D>::Split(NodeId leaf) {
                                            BoxOf(Child(At(leaf), 2)), BoxOf(Child(At(leaf), 3))};
       segments_.HandDown(leaf, first, cubes);
     }
-  }
-  if (D == 3 && !surface_nodes_.IsEmpty()) {
-    surface_nodes_.HandDown(leaf, At(leaf).level, first);
   }
   if (!pending_.empty()) {
     DistributeRange(leaf);

@@ -21,7 +21,6 @@
 #include "core/tree/leaf_vertices.h"
 #include "core/tree/morton.h"
 #include "core/tree/segment_lists.h"
-#include "core/tree/surface_nodes.h"
 
 namespace wellspace::core {
 
@@ -72,13 +71,6 @@ class LeafTree {
                      const RunContext& context, std::vector<SegmentLists::Ends> segments = {});
   const SegmentLists& segments() const { return segments_; }
 
-  // In space: has every node know, from now on, where in `index` queries about the surface near it begin.
-  //
-  // REQUIRES:   built; `index`, under the same grid, outlives this.
-  // Complexity: O(nodes).
-  void FollowSurface(const SurfaceIndex& index) requires(D == 3);
-  const SurfaceNodes& surface_nodes() const { return surface_nodes_; }
-
   // Makes room for so many vertices to be told where they are.
   void Reserve(uint32_t vertices) { leaf_of_.reserve(vertices); }
 
@@ -121,8 +113,7 @@ class LeafTree {
   // The memory that the tree takes.
   uint64_t MemoryBytes() const {
     return nodes_.size() * sizeof(Node) + pool_.MemoryBytes() + ranges_.size() * sizeof(Range) +
-           leaf_of_.size() * sizeof(NodeId) + around_.size() * sizeof(Around) + segments_.MemoryBytes() +
-           surface_nodes_.MemoryBytes();
+           leaf_of_.size() * sizeof(NodeId) + around_.size() * sizeof(Around) + segments_.MemoryBytes();
   }
   // Whether `node` is a leaf that covers a part of the box.
   bool IsLeaf(NodeId node) const { return At(node).first_child == kNoNode && !At(node).outside; }
@@ -280,8 +271,7 @@ class LeafTree {
   HugeVector<Node> nodes_;
   VertexPool pool_;
   HugeVector<NodeId> leaf_of_;
-  SegmentLists segments_;       // none unless D is 2
-  SurfaceNodes surface_nodes_;  // none unless D is 3
+  SegmentLists segments_;  // none unless D is 2
 
   // During Build only.
   std::span<const Point<D>> points_;

@@ -1,4 +1,4 @@
-// Where the triangles of a complex are, and in which solid a point lies.
+// An index of the triangles of a complex, which finds those near a point, and the solid that it lies in.
 #ifndef WELLSPACE_CORE_TREE_SURFACE_INDEX_H_
 #define WELLSPACE_CORE_TREE_SURFACE_INDEX_H_
 
@@ -139,7 +139,7 @@ class SurfaceIndex {
   IndexNode Holding(const Box<3>& box) const;
 
   uint32_t node_count() const { return static_cast<uint32_t>(nodes_.size()); }
-  uint64_t entry_count() const { return listed_.size(); }
+  uint64_t entry_count() const { return listed_.size(); }  // for tests
   // 0 of the root; a node's cube is half as long as that of the level before.
   int level(IndexNode node) const { return node == 0 ? 0 : parents_[(node - 1) / 8].level + 1; }
   bool IsLeaf(IndexNode node) const { return nodes_[node].count != kInner; }

@@ -1,4 +1,4 @@
-// How far some triangles in space are from others.
+// The distance of some triangles in space from others.
 #ifndef WELLSPACE_CORE_VALIDATE_DEVIATION_H_
 #define WELLSPACE_CORE_VALIDATE_DEVIATION_H_
 

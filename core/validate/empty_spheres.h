@@ -1,4 +1,4 @@
-// Whether circumspheres are empty, for meshes of domains, of which the lemma about neighbours is not enough.
+// The check that circumspheres are empty, for meshes of domains, of which the lemma about neighbours is not enough.
 #ifndef WELLSPACE_CORE_VALIDATE_EMPTY_SPHERES_H_
 #define WELLSPACE_CORE_VALIDATE_EMPTY_SPHERES_H_
 

@@ -1,4 +1,4 @@
-// Whether a mesh has the points of a cloud of which near ones were merged: ValidateCloud asks it then.
+// The check that a mesh has the points of a cloud of which near ones were merged, as part of ValidateCloud.
 #ifndef WELLSPACE_CORE_VALIDATE_MERGED_CLOUD_H_
 #define WELLSPACE_CORE_VALIDATE_MERGED_CLOUD_H_
 

@@ -1,4 +1,4 @@
-// Whether a mesh is that of its domain.
+// The check that a mesh is that of its domain.
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -1,4 +1,4 @@
-// How many file descriptors this process may have, and their uses.
+// The limit on file descriptors of this process, and their uses.
 #ifndef WELLSPACE_SERVER_BASE_DESCRIPTOR_LIMIT_H_
 #define WELLSPACE_SERVER_BASE_DESCRIPTOR_LIMIT_H_
 

@@ -1,4 +1,4 @@
-// How many features there are, and by which rules they bound a domain.
+// Numbers of features, and the rules by which they bound a domain.
 #ifndef WELLSPACE_SERVER_INPUTS_FEATURE_SUMMARY_H_
 #define WELLSPACE_SERVER_INPUTS_FEATURE_SUMMARY_H_
 

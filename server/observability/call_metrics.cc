@@ -8,7 +8,7 @@ namespace {
 
 constexpr char kUnknown[] = "unknown";
 
-// By number.
+// The values of grpc_code, by number of the status.
 constexpr std::array<std::string_view, 17> kCodeLabels = {
     "OK",       "Canceled",       "Unknown",          "InvalidArgument",   "DeadlineExceeded",
     "NotFound", "AlreadyExists",  "PermissionDenied", "ResourceExhausted", "FailedPrecondition",
@@ -66,8 +66,6 @@ struct CallMetrics::Families {
   prometheus::Family<prometheus::Counter>& sent;
   prometheus::Family<prometheus::Histogram>& seconds;
 };
-
-std::string_view CodeLabel(grpc::StatusCode code) { return kCodeLabels[IndexOf(code)]; }
 
 void CallMetrics::Method::Handled(grpc::StatusCode code, double duration_seconds) const {
   handled[IndexOf(code)]->Increment();

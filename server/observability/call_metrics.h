@@ -16,9 +16,6 @@
 
 namespace wellspace::server {
 
-// The name of a status code as the label grpc_code has it: "OK", "Canceled", "InvalidArgument".
-std::string_view CodeLabel(grpc::StatusCode code);
-
 // grpc_server_started_total, grpc_server_handled_total, grpc_server_msg_received_total, grpc_server_msg_sent_total and
 // grpc_server_handling_seconds by grpc_type, grpc_service, grpc_method and, of those handled, grpc_code.
 //

@@ -36,7 +36,7 @@ class MeshDeltas {
   // that are not kept any more, to be freed without locks.
   [[nodiscard]] std::vector<Delta> Advance(Delta delta, uint64_t mesh_bytes);
 
-  // Those that lead from the mesh of revision `since` to that of `revision`, one after the other; none if both are the
+  // The differences from the mesh of revision `since` to that of `revision`, one after the other; none if both are the
   // same.
   //
   // Errors:     DELTA_NOT_KEPT, naming the revisions since which there are some.

@@ -53,7 +53,7 @@ struct AppendedPoints {
   store::v1::PointsFile file{};  // where those that are new lie
 };
 
-// `appended` are the session's. Nothing changes where none are new: the change has no record then.
+// `appended` are the session's. Where none are new, the change has no step, and its record is the state's.
 SessionChange PointsChange(const SessionState& state, const AppendedPoints& appended);
 
 // The session has `left` points, in this file, whose checksum is `crc32c`, and no structure.

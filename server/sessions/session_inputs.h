@@ -22,7 +22,7 @@ namespace wellspace::server {
 // The sizes at points that a session has, by the numbers of their sets.
 using SizeSets = std::map<uint64_t, std::shared_ptr<const core::SizeSamples>>;
 
-// Those that `records` have of `session`, which are to be `wanted`.
+// The sets of `session` in `records`, which are to be `wanted`.
 //
 // Errors:     DATA_LOSS.
 absl::StatusOr<SizeSets> ReadSizeSets(Records& records, const std::string& session,

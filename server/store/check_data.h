@@ -1,4 +1,4 @@
-// Whether a folder of sessions is whole.
+// The check that a folder of sessions is whole.
 #ifndef WELLSPACE_SERVER_STORE_CHECK_DATA_H_
 #define WELLSPACE_SERVER_STORE_CHECK_DATA_H_
 

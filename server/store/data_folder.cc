@@ -126,7 +126,7 @@ std::vector<std::string> FilesOf(const DataPaths& paths, const store::v1::Sessio
 }
 
 absl::StatusOr<std::vector<std::string>> FindUnknown(const DataPaths& paths, FileSystem& files) {
-  static constexpr std::array<std::string_view, 11> kKnown = {"lock",
+  static constexpr std::array<std::string_view, 12> kKnown = {"lock",
                                                               "back-up.lock",
                                                               "ballast",
                                                               "files",
@@ -136,7 +136,8 @@ absl::StatusOr<std::vector<std::string>> FindUnknown(const DataPaths& paths, Fil
                                                               "sessions.db-journal",
                                                               "sessions.db-shm",
                                                               "sessions.db-wal",
-                                                              "sessions.db-mark"};
+                                                              "sessions.db-mark",
+                                                              "sessions.db.moved"};
   std::vector<std::string> unknown;
   WELLSPACE_ASSIGN_OR_RETURN(const std::vector<std::string> names, files.List(paths.root));
   for (const std::string& name : names) {
@@ -240,9 +241,11 @@ absl::StatusOr<Garbage> DataFolder::RemoveGarbage(FilesInUse& in_use, const std:
   // Uses keep files written in these places from now on: only those there before become obsolete.
   Candidates candidates;
   for (const std::string& name : names) {
-    const std::string path = absl::StrCat(paths_.files(), "/", name);
-    if (IsNameOfOurs(name) && !in_use.Contains(path)) {
-      candidates.emplace(name, in_use.Take(path, /*is_written=*/false));
+    if (!IsNameOfOurs(name)) {
+      continue;
+    }
+    if (auto use = in_use.TakeUnlessUsed(absl::StrCat(paths_.files(), "/", name))) {
+      candidates.emplace(name, std::move(use));
     }
   }
   // After that, so that files that have come to be named meanwhile are seen.

@@ -9,6 +9,15 @@ FilesInUse::Use::Use(std::shared_ptr<FilesInUse> files, std::string path, uint64
 
 std::unique_ptr<FilesInUse::Use> FilesInUse::Take(const std::string& path, bool is_written) {
   const std::lock_guard lock(mutex_);
+  return TakeLocked(path, is_written);
+}
+
+std::unique_ptr<FilesInUse::Use> FilesInUse::TakeUnlessUsed(const std::string& path) {
+  const std::lock_guard lock(mutex_);
+  return states_.contains(path) ? nullptr : TakeLocked(path, /*is_written=*/false);
+}
+
+std::unique_ptr<FilesInUse::Use> FilesInUse::TakeLocked(const std::string& path, bool is_written) {
   State& state = states_[path];
   ++state.uses;
   if (is_written) {
@@ -17,11 +26,6 @@ std::unique_ptr<FilesInUse::Use> FilesInUse::Take(const std::string& path, bool 
     state.set_aside.clear();
   }
   return std::unique_ptr<Use>(new Use(shared_from_this(), path, state.version));
-}
-
-bool FilesInUse::Contains(const std::string& path) const {
-  const std::lock_guard lock(mutex_);
-  return states_.contains(path);
 }
 
 void FilesInUse::Remove(const std::string& path) {

@@ -48,7 +48,8 @@ class FilesInUse : public std::enable_shared_from_this<FilesInUse> {
 
   // `is_written`: a new file is about to be written in this place.
   std::unique_ptr<Use> Take(const std::string& path, bool is_written);
-  bool Contains(const std::string& path) const;
+  // As Take of a file that is not written; null if it is in use.
+  std::unique_ptr<Use> TakeUnlessUsed(const std::string& path);
   // Removes the file now, or when its last use ends.
   void Remove(const std::string& path);
 
@@ -60,13 +61,15 @@ class FilesInUse : public std::enable_shared_from_this<FilesInUse> {
     std::string set_aside{};  // its name then; empty: it is removed
   };
 
+  // Both with mutex_ held.
+  std::unique_ptr<Use> TakeLocked(const std::string& path, bool is_written);
   void RemoveNow(const std::string& path, const std::string& set_aside = "");
   void Release(const std::string& path);
   void MakeObsolete(const std::string& path, uint64_t version, const std::string& set_aside);
 
   FileSystem& file_system_;
   const std::function<bool()> may_remove_;
-  mutable std::mutex mutex_;             // held while a file is removed, so that none is written in its place meanwhile
+  std::mutex mutex_;                     // held while a file is removed, so that none is written in its place meanwhile
   std::map<std::string, State> states_;  // guarded by mutex_
 };
 

@@ -28,9 +28,8 @@ class MeshSnapshot {
   MeshSnapshot(const MeshSnapshot&) = delete;
   MeshSnapshot& operator=(const MeshSnapshot&) = delete;
 
-  // The record that names the mesh in a SessionRecord: all that is known of it without a look at its arrays.
-  // Of a mesh that is in memory alone the record has
-  // nothing about a file.
+  // The record that names the mesh in a SessionRecord: all that is known of it without a look at its arrays. Of a mesh
+  // that is in memory alone the record has nothing about a file.
   const store::v1::MeshRecord& record() const { return record_; }
   uint64_t revision() const { return record_.revision(); }
 

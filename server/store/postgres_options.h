@@ -1,4 +1,4 @@
-// Where a PostgreSQL database is, and who this process is there.
+// The address of a PostgreSQL database, and the name of this process there.
 #ifndef WELLSPACE_SERVER_STORE_POSTGRES_OPTIONS_H_
 #define WELLSPACE_SERVER_STORE_POSTGRES_OPTIONS_H_
 

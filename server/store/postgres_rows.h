@@ -67,7 +67,7 @@ inline absl::StatusOr<store::v1::AnswerRecord> ParseAnswer(const pqxx::row& row)
                                         absl::StrCat("the answer to request '", request.str(), "'"));
 }
 
-// Those that a change writes, for an owner.
+// The rows that a change writes, for an owner.
 class PostgresRows final : public RecordRows {
  public:
   PostgresRows(pqxx::dbtransaction& transaction, int64_t owner) : transaction_(transaction), owner_(owner) {}

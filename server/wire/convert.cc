@@ -170,7 +170,7 @@ v1::MeshStatistics StatisticsToProto(const core::MeshStatistics& statistics) {
   seconds->set_slivers(statistics.sliver_seconds);
   seconds->set_total(statistics.total_seconds);
 
-  if (statistics.slivers_are_asked_about) {
+  if (statistics.slivers_wanted) {
     v1::SliverStatistics* slivers = message.mutable_slivers();
     slivers->set_found(statistics.slivers);
     slivers->set_left(statistics.slivers_left);

@@ -22,7 +22,7 @@ namespace wellspace::server {
 // Errors:     INVALID_PARAMETERS with the path of the first wrong field.
 absl::StatusOr<core::MeshParameters> ParametersFromProto(const v1::MeshParameters& message,
                                                          const ServiceOptions& options);
-// Those that ParametersToProto has made, whatever the limits of the server are now.
+// The parameters of a message that ParametersToProto has made, whatever the limits of the server are now.
 absl::StatusOr<core::MeshParameters> ParametersFromRecord(const v1::MeshParameters& message);
 
 // Refuses valid parameters that such an input does not have; see core::ValidateDomainParameters and

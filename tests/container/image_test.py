@@ -1,7 +1,7 @@
-"""The image of the Dockerfile: built on a fresh Debian, small, without a compiler, serving as nobody on a read-only root.
+"""The image of the Dockerfile: built on a fresh Debian, small, no compiler, serving as nobody on a read-only root.
 
-Wants root, debootstrap, podman and buildah (deploy/install-deps.sh container), and Debian's packages within reach; takes some ten
-minutes. No engine has to run: the base is made by debootstrap, and processes are started in chroots.
+Wants root, debootstrap, podman and buildah (deploy/install-deps.sh container), and Debian's packages within reach;
+takes some ten minutes. No engine has to run: the base is made by debootstrap, and processes are started in chroots.
 """
 import json
 import os
@@ -36,7 +36,8 @@ def size_of(folder):
 def descendants(pid):
     # Programs in Go start processes from any of their threads.
     children = " ".join(path.read_text() for path in pathlib.Path(f"/proc/{pid}/task").glob("*/children")).split()
-    return [int(child) for child in children] + [grandchild for child in children for grandchild in descendants(int(child))]
+    return [int(child) for child in children] + [grandchild for child in children
+                                                 for grandchild in descendants(int(child))]
 
 
 @unittest.skipUnless(os.geteuid() == 0 and all(map(shutil.which, TOOLS)), "wants root and " + ", ".join(TOOLS))
@@ -55,7 +56,8 @@ class Image(unittest.TestCase):
         cls.base_bytes = size_of(base)
         shutil.rmtree(base)
         cls.run_tool("podman", *cls.storage, "import", archive, BASE)
-        cls.run_tool("buildah", *cls.storage, "bud", "--isolation", "chroot", "--format", "docker", "--pull-never", "--tag", IMAGE, ROOT)
+        cls.run_tool("buildah", *cls.storage, "bud", "--isolation", "chroot", "--format", "docker", "--pull-never",
+                     "--tag", IMAGE, ROOT)
         cls.container = cls.run_tool("buildah", *cls.storage, "from", "--pull-never", IMAGE).strip()
         cls.root = pathlib.Path(cls.run_tool("buildah", *cls.storage, "mount", cls.container).strip())
         cls.addClassCleanup(cls.run_tool, "buildah", *cls.storage, "rm", cls.container)
@@ -77,7 +79,8 @@ class Image(unittest.TestCase):
 
     def mesh_from_outside(self, address):
         mesh = self.folder / "spot.vtu"
-        self.run_tool(BIN / "wellspace", "mesh", ROOT / "examples" / "spot.csv", "-o", mesh, "--quiet", "--server", address)
+        self.run_tool(BIN / "wellspace", "mesh", ROOT / "examples" / "spot.csv", "-o", mesh, "--quiet", "--server",
+                      address)
         self.run_tool(BIN / "wellspace", "check", mesh, "--cloud", ROOT / "examples" / "spot.csv", "--rho", "2")
 
     def stop(self, process):
@@ -98,7 +101,8 @@ class Image(unittest.TestCase):
 
     def test_has_no_compiler(self):
         for name in ["cc", "c++", "gcc", "g++", "cpp", "ld", "as", "clang", "cmake", "ninja", "make", "protoc"]:
-            self.assertIsNone(shutil.which(name, path=":".join(str(self.root / path) for path in ["usr/bin", "usr/local/bin"])), name)
+            self.assertIsNone(shutil.which(name, path=":".join(str(self.root / path)
+                                                               for path in ["usr/bin", "usr/local/bin"])), name)
         self.assertEqual(list(self.root.glob("usr/lib/gcc*/*/*/cc1*")), [])
 
     def test_has_the_licences_of_all_that_is_linked(self):
@@ -113,7 +117,8 @@ class Image(unittest.TestCase):
             self.assertTrue(package in compiled_in or (documents / package / "copyright").is_file(), package)
 
     def test_says_how_it_is_run(self):
-        config = json.loads(self.run_tool("buildah", *self.storage, "inspect", "--type", "image", IMAGE))["Docker"]["config"]
+        config = json.loads(self.run_tool("buildah", *self.storage, "inspect", "--type", "image",
+                                          IMAGE))["Docker"]["config"]
         self.assertEqual(config["User"], str(USER))
         self.assertEqual(config["Entrypoint"], ["wellspaced"])
         self.assertIn("7233", " ".join(config["ExposedPorts"]))
@@ -129,7 +134,8 @@ class Image(unittest.TestCase):
 
     def test_serves_on_a_read_only_root(self):
         started = time.time()
-        script = 'mount --bind "$0" "$0" && mount -o remount,bind,ro "$0" && exec chroot --userspec="$1" "$0" wellspaced --listen 127.0.0.1:0'
+        script = ('mount --bind "$0" "$0" && mount -o remount,bind,ro "$0" && '
+                  'exec chroot --userspec="$1" "$0" wellspaced --listen 127.0.0.1:0')
         process, address = self.serve("unshare", "--mount", "sh", "-c", script, self.root, f"{USER}:{USER}")
         self.mesh_from_outside(address)
         self.stop(process)

@@ -22,7 +22,7 @@ SOON = 10  # seconds, for answers that come within milliseconds where nothing el
 
 
 class Acceptance(unittest.TestCase):
-    """One server, and one session with a mesh of some 12 MiB, of which the events are kept with the times of their coming."""
+    """One server, and one session with a mesh of some 12 MiB, whose events are kept with their times."""
 
     @classmethod
     def setUpClass(cls):
@@ -246,14 +246,16 @@ class Acceptance(unittest.TestCase):
         environment = os.environ | {"WELLSPACE_SERVER": remote.address}
         # A client that is killed while its session is refined: the work may end, then the lease runs out.
         name = remote.create(unit_box(2, max_circumradius=0.003), ttl={"seconds": 1}).name
-        with subprocess.Popen([BIN / "wellspace", "refine", name], env=environment, stderr=subprocess.DEVNULL) as client:
+        with subprocess.Popen([BIN / "wellspace", "refine", name], env=environment,
+                              stderr=subprocess.DEVNULL) as client:
             self.until(lambda: remote.list().sessions[0].state != api().Session.STATE_OPEN)
             client.kill()
         self.until(lambda: not remote.list().sessions)
         with Fails(self, grpc.StatusCode.NOT_FOUND, "SESSION_NOT_FOUND"):
             remote.get(name)
         # One that is killed while its own call works: the worker is free again.
-        command = [BIN / "wellspace", "mesh", "-", "--dimension", "2", "--domain", "0,0,1,1", "--size", "1e-4", "-o", "-"]
+        command = [BIN / "wellspace", "mesh", "-", "--dimension", "2", "--domain", "0,0,1,1", "--size", "1e-4", "-o",
+                   "-"]
         with subprocess.Popen(command, env=environment, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL,
                               stderr=subprocess.DEVNULL) as client:
             client.stdin.close()
@@ -262,7 +264,8 @@ class Acceptance(unittest.TestCase):
         self.until(lambda: remote.info().running_jobs == 0)
 
     def test_everything_has_a_type(self):
-        of_google = ("google.protobuf.Timestamp", "google.protobuf.Duration", "google.protobuf.FieldMask", "google.rpc.Status")
+        of_google = ("google.protobuf.Timestamp", "google.protobuf.Duration", "google.protobuf.FieldMask",
+                     "google.rpc.Status")
         services = [stub.removesuffix("Stub") for stub in vars(api()) if re.fullmatch(r"\w+ServiceStub", stub)]
         self.assertEqual(len(services), 4)
         seen = set()
@@ -290,7 +293,8 @@ class Acceptance(unittest.TestCase):
 
     def test_wrong_credentials_are_told_at_once(self):
         tokens = self.folder() / "tokens"
-        lines = [subprocess.run([BIN / "wellspaced", "hash-token", tenant], input=f"a-token-of-{tenant}-with-32-characters",
+        lines = [subprocess.run([BIN / "wellspaced", "hash-token", tenant],
+                                input=f"a-token-of-{tenant}-with-32-characters",
                                 capture_output=True, text=True, check=True).stdout for tenant in ("ann", "bob")]
         tokens.write_text("".join(lines))
         _, remote = self.start_server("--token-file", tokens)
@@ -305,9 +309,11 @@ class Acceptance(unittest.TestCase):
 
         for secret in (None, "not-a-token-that-the-server-knows"):
             calls = {
-                "one message": lambda: remote.sessions.ListSessions(api().ListSessionsRequest(), metadata=metadata(secret)),
+                "one message": lambda: remote.sessions.ListSessions(api().ListSessionsRequest(),
+                                                                    metadata=metadata(secret)),
                 "up": lambda: remote.sessions.UploadPoints(endless(), metadata=metadata(secret)),
-                "down": lambda: list(remote.sessions.DownloadMesh(api().DownloadMeshRequest(), metadata=metadata(secret))),
+                "down": lambda: list(remote.sessions.DownloadMesh(api().DownloadMeshRequest(),
+                                                                  metadata=metadata(secret))),
             }
             for name, call in calls.items():
                 with self.subTest(name, secret=secret):
@@ -319,18 +325,20 @@ class Acceptance(unittest.TestCase):
         ann, bob = (metadata(f"a-token-of-{tenant}-with-32-characters") for tenant in ("ann", "bob"))
         request = api().CreateSessionRequest(parameters=unit_box(2))
         session = remote.sessions.CreateSession(request, metadata=ann).session
-        self.assertEqual(remote.sessions.GetSession(api().GetSessionRequest(name=session.name), metadata=ann).session.name, session.name)
+        self.assertEqual(remote.sessions.GetSession(api().GetSessionRequest(name=session.name),
+                                                    metadata=ann).session.name, session.name)
         with Fails(self, grpc.StatusCode.NOT_FOUND, "SESSION_NOT_FOUND"):
             remote.sessions.GetSession(api().GetSessionRequest(name=session.name), metadata=bob)
 
     def test_transport_security_is_part_of_it(self):
         folder = self.folder()
         subprocess.run(["openssl", "req", "-x509", "-days", "2", "-subj", "/CN=localhost", "-addext",
-                        "subjectAltName=IP:127.0.0.1,DNS:localhost", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes",
+                        "subjectAltName=IP:127.0.0.1,DNS:localhost", "-newkey", "ec", "-pkeyopt",
+                        "ec_paramgen_curve:P-256", "-nodes",
                         "-keyout", folder / "key.pem", "-out", folder / "cert.pem"], capture_output=True, check=True)
         # No plain-text port is opened to other machines by mistake.
-        refused = subprocess.run([BIN / "wellspaced", "--listen", "0.0.0.0:0"], capture_output=True, text=True, timeout=PATIENCE,
-                                 check=False)
+        refused = subprocess.run([BIN / "wellspaced", "--listen", "0.0.0.0:0"], capture_output=True, text=True,
+                                 timeout=PATIENCE, check=False)
         self.assertNotEqual(refused.returncode, 0)
         self.assertIn("--tls-cert", refused.stderr)
         server, plain = self.start_server("--tls-cert", folder / "cert.pem", "--tls-key", folder / "key.pem")

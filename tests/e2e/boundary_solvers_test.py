@@ -50,8 +50,8 @@ class Solvers(unittest.TestCase):
         subprocess.run([BIN / "wellspace", *map(str, arguments)], cwd=cls.folder, check=True, timeout=120)
 
     def run_program(self, *command, **environment):
-        result = subprocess.run(list(map(str, command)), cwd=self.folder, text=True, timeout=240, stdout=subprocess.PIPE,
-                                stderr=subprocess.STDOUT, env=os.environ | environment)
+        result = subprocess.run(list(map(str, command)), cwd=self.folder, text=True, timeout=240,
+                                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env=os.environ | environment)
         self.assertEqual(result.returncode, 0, result.stdout)
         return result.stdout
 
@@ -76,7 +76,8 @@ class Solvers(unittest.TestCase):
                 self.assertIsNotNone(figures, text)
                 self.assertAlmostEqual(float(figures[1]), expected, delta=0.01 * expected)
                 self.assertEqual(int(figures[2]), self.counts[dimension].sum())
-                self.assertAlmostEqual(float(figures[4]) / float(figures[3]), 1, places=9, msg="the normal of xmax is that of x")
+                self.assertAlmostEqual(float(figures[4]) / float(figures[3]), 1, places=9,
+                                       msg="the normal of xmax is that of x")
                 self.assertRegex(text, rf"(?m)^labels {2 * dimension}$")
 
     @unittest.skipUnless(shutil.which("gmsh") and has_module("gmsh"), "gmsh or python3-gmsh is not installed")
@@ -168,8 +169,9 @@ print("cells", len(cells.values), len(set(cells.values)))
         system = self.folder / "system"
         system.mkdir(exist_ok=True)
         header = "FoamFile {{ version 2.0; format ascii; class dictionary; object {}; }}\n"
-        (system / "controlDict").write_text(header.format("controlDict") + "application none; startFrom startTime; startTime 0;\n"
-                                            "stopAt endTime; endTime 1; deltaT 1; writeControl timeStep; writeInterval 1;\n")
+        control = ("application none; startFrom startTime; startTime 0;\n"
+                   "stopAt endTime; endTime 1; deltaT 1; writeControl timeStep; writeInterval 1;\n")
+        (system / "controlDict").write_text(header.format("controlDict") + control)
         (system / "fvSchemes").write_text(header.format("fvSchemes"))
         (system / "fvSolution").write_text(header.format("fvSolution"))
         self.run_program("gmshToFoam", "3-22.msh", WM_PROJECT_DIR="/usr/share/openfoam")
@@ -204,7 +206,8 @@ print("cells", len(cells.values), len(set(cells.values)))
                               for vertex in numpy.flatnonzero(tags) for axis in range(dimension)]
                 (self.folder / f"deck{dimension}.inp").write_text("\n".join(
                     [f"*INCLUDE, INPUT={name}.inp", "*NSET, NSET=all, GENERATE", f"1, {len(vertices)}, 1",
-                     "*MATERIAL, NAME=steel", "*ELASTIC", "210000., 0.3", "*SOLID SECTION, ELSET=domain, MATERIAL=steel",
+                     "*MATERIAL, NAME=steel", "*ELASTIC", "210000., 0.3",
+                     "*SOLID SECTION, ELSET=domain, MATERIAL=steel",
                      *(["1e-5"] if dimension == 2 else []), "*BOUNDARY", *(line for line in self.in_width(conditions)),
                      "*STEP", "*STATIC", "*NODE PRINT, NSET=all", "U", "*END STEP", ""]))
                 self.run_program("ccx", "-i", f"deck{dimension}")

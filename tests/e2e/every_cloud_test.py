@@ -25,7 +25,8 @@ def degenerate_clouds(d):
     corner = [[(c >> i) & 1 for i in range(d)] for c in range(2**d)]
     line = [[0.1 + 0.8 * i / 40] * d for i in range(41)]
     rounded = [[round(256 * x) / 256 for x in p] for p in make_clouds.cloud("uniform", d, 300)]
-    on_faces = [[0.0 if i % d == k else x for k, x in enumerate(p)] for i, p in enumerate(make_clouds.cloud("inner", d, 60))]
+    on_faces = [[0.0 if i % d == k else x for k, x in enumerate(p)]
+                for i, p in enumerate(make_clouds.cloud("inner", d, 60))]
     return {
         "none": [],
         "one": [[0.3] * d],
@@ -49,8 +50,8 @@ class EveryCloud(unittest.TestCase):
         cloud, mesh_file, stats_file = folder / "cloud.csv", folder / "mesh.vtu", folder / "stats.json"
         cloud.write_text("".join(",".join(map(repr, p)) + "\n" for p in points))
         unit_box = ",".join(["0"] * d + ["1"] * d)
-        self.run_tool("mesh", cloud, "-o", mesh_file, "--dimension", str(d), "--domain", unit_box, "--rho", str(rho), "--stats",
-                      stats_file, "--quiet")
+        self.run_tool("mesh", cloud, "-o", mesh_file, "--dimension", str(d), "--domain", unit_box, "--rho", str(rho),
+                      "--stats", stats_file, "--quiet")
         checked = ["check", mesh_file, "--rho", str(rho)]
         self.run_tool(*checked, *(["--cloud", cloud] if points else []))
 
@@ -97,8 +98,8 @@ class EveryCloud(unittest.TestCase):
         with tempfile.TemporaryDirectory() as name:
             folder = pathlib.Path(name)
             numpy.save(folder / "cloud.npy", points)
-            self.run_tool("mesh", folder / "cloud.npy", "-o", folder / "mesh.npz", "--domain", "0,0,0,0,1,1,1,1", "--stats",
-                          folder / "stats.json", "--quiet")
+            self.run_tool("mesh", folder / "cloud.npy", "-o", folder / "mesh.npz", "--domain", "0,0,0,0,1,1,1,1",
+                          "--stats", folder / "stats.json", "--quiet")
             self.run_tool("check", folder / "mesh.npz", "--cloud", folder / "cloud.npy", "--rho", "2.9")
             stats = json.loads((folder / "stats.json").read_text())
             with numpy.load(folder / "mesh.npz", allow_pickle=False) as mesh:

@@ -1,4 +1,4 @@
-"""The whole life of a session from Python: Debian's grpcio, stubs made of the protos, and nothing else of this project."""
+"""The whole life of a session from Python: Debian's grpcio, stubs of the protos, and nothing else of this project."""
 import threading
 import unittest
 
@@ -93,7 +93,8 @@ class PythonClient(unittest.TestCase):
         self.assertEqual(self.remote.get(name).state, api().Session.STATE_READY)
         finer = Mesh(*self.remote.download(name))
         numpy.testing.assert_array_equal(finer.points[added.vertices], more)
-        numpy.testing.assert_array_equal(finer.points[:metadata.vertex_count], mesh.points, "vertices keep their numbers")
+        numpy.testing.assert_array_equal(finer.points[:metadata.vertex_count], mesh.points,
+                                         "vertices keep their numbers")
         self.assertAlmostEqual(finer.volume(), 1, places=12)
         request = api().ListOperationsRequest(parent=name)
         listed = self.remote.operations.ListOperations(request, timeout=PATIENCE).operations
@@ -114,7 +115,8 @@ class PythonClient(unittest.TestCase):
         nearest = numpy.concatenate([batch.distances for batch in batches])
         self.assertEqual(len(nearest), count)
         edges = mesh.points[mesh.simplices] - mesh.points[numpy.roll(mesh.simplices, 1, axis=1)]
-        self.assertEqual(nearest.min(), numpy.sqrt((edges**2).sum(axis=2).min()), "the shortest edge of a Delaunay mesh")
+        self.assertEqual(nearest.min(), numpy.sqrt((edges**2).sum(axis=2).min()),
+                         "the shortest edge of a Delaunay mesh")
 
         wanted = list(range(count - 1, -1, -1))
         request = api().ClippedVoronoiCellsRequest(name=name, vertices=wanted, beta=1.5)
@@ -173,7 +175,7 @@ class PythonClient(unittest.TestCase):
         self.remote.delete(name)
 
     def assert_tiled(self, metadata, mesh):
-        """The boundary of the unit box: of each face its facets, which cover it, and which have the mesh behind them."""
+        """The boundary of the unit box: of each face its facets, which cover it, and have the mesh behind them."""
         d = metadata.dimension
         names = ["xmin", "xmax", "ymin", "ymax", "zmin", "zmax"][:2 * d]
         self.assertEqual([(part.tag, part.name) for part in metadata.boundary], list(enumerate(names, 1)))

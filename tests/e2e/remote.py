@@ -77,7 +77,8 @@ class Mesh:
 def smallest_dihedral_angle(mesh):
     """Of a mesh of tetrahedra, in degrees."""
     corners = mesh.points[mesh.simplices]
-    gradients = numpy.linalg.inv(corners[:, 1:] - corners[:, :1])  # of barycentric coordinates: normals of facets, in columns
+    # Of barycentric coordinates: normals of facets, in columns.
+    gradients = numpy.linalg.inv(corners[:, 1:] - corners[:, :1])
     normals = numpy.concatenate([-gradients.sum(axis=2, keepdims=True), gradients], axis=2)
     normals /= numpy.linalg.norm(normals, axis=1, keepdims=True)
     cosines = -numpy.einsum("tki,tkj->tij", normals, normals)[:, *numpy.triu_indices(4, 1)]
@@ -161,7 +162,7 @@ def content(chunks):
 
 
 class Fails:
-    """`with Fails(test, code) as error:` and an RpcError of that code; then error.details has its google.rpc details by name."""
+    """`with Fails(test, code) as error:` and an RpcError of that code, whose google.rpc details error.details has."""
 
     def __init__(self, test, code, reason=None):
         self.test, self.code, self.reason, self.details, self.message = test, code, reason, None, None
@@ -177,7 +178,8 @@ class Fails:
         self.details, self.message = details(error), error.details()
         if self.reason is not None:
             info = self.details["google.rpc.ErrorInfo"]
-            self.test.assertEqual((info.domain, info.reason), ("wellspace.v1", "ERROR_REASON_" + self.reason), self.message)
+            self.test.assertEqual((info.domain, info.reason), ("wellspace.v1", "ERROR_REASON_" + self.reason),
+                                  self.message)
         return True
 
     @property

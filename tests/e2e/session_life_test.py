@@ -40,8 +40,8 @@ class SessionLife(unittest.TestCase):
         self.folder = pathlib.Path(folder.name)
 
     def run_tool(self, *arguments, exit_code=0, text="", program="wellspace"):
-        done = subprocess.run([BIN / program, *map(str, arguments)], capture_output=True, text=True, input=text, timeout=PATIENCE,
-                              env=self.environment, check=False)
+        done = subprocess.run([BIN / program, *map(str, arguments)], capture_output=True, text=True, input=text,
+                              timeout=PATIENCE, env=self.environment, check=False)
         self.assertEqual(done.returncode, exit_code, (arguments, done.stderr, done.stdout))
         return done.stdout if exit_code == 0 else done.stderr
 
@@ -57,7 +57,8 @@ class SessionLife(unittest.TestCase):
     def test_a_session_makes_the_mesh_that_one_call_makes(self):
         name = self.create("--dimension", 2, "--label", "who=e2e")
         points = COAST.read_text().splitlines()[1:]
-        for part, offset in ((points[:2000], 0), (points[:3000], 0), (points[3000:], None)):  # a repetition, then the rest
+        for part, offset in ((points[:2000], 0), (points[:3000], 0),
+                             (points[3000:], None)):  # a repetition, then the rest
             self.run_tool("upload", name, "-", *(["--offset", offset] if offset is not None else []),
                           text="\n".join(part) + "\n")
         self.assertEqual(self.run_json("session", "show", name)["committed_points"], len(points))
@@ -69,7 +70,8 @@ class SessionLife(unittest.TestCase):
         self.run_tool("download", name, "-o", self.folder / "session.npz", "--revision", operation["mesh_revision"])
         self.run_tool("mesh", COAST, "-o", self.folder / "mesh.npz")
         self.assertEqual((self.folder / "session.npz").read_bytes(), (self.folder / "mesh.npz").read_bytes())
-        events = [json.loads(line) for line in self.run_tool("watch", operation["name"], "--output", "json").splitlines()]
+        events = [json.loads(line)
+                  for line in self.run_tool("watch", operation["name"], "--output", "json").splitlines()]
         self.assertEqual(events[-1]["state"], "succeeded")
         listed = self.run_json("session", "list", "--label", "who=e2e")
         self.assertEqual([one["name"] for one in listed], [name])
@@ -142,7 +144,8 @@ class SessionLife(unittest.TestCase):
         self.assertIn("cancelled", self.run_tool("cancel", name))
         self.assertIn("CANCELLED", self.run_tool("watch", operation, exit_code=1))
 
-        refine = subprocess.Popen([BIN / "wellspace", "refine", name], env=self.environment, stderr=subprocess.PIPE, text=True)
+        refine = subprocess.Popen([BIN / "wellspace", "refine", name], env=self.environment, stderr=subprocess.PIPE,
+                                  text=True)
         while self.run_json("session", "show", name)["last_operation"] == operation:
             pass
         refine.send_signal(signal.SIGINT)
@@ -158,7 +161,8 @@ class SessionLife(unittest.TestCase):
         self.run_tool("upload", name, "-", text=csv(points[:60]))
         self.run_tool("upload", name, "-", "--offset", 0, text=csv(points))
         for other, offset in ((uniform(100, 5), 0), (points[:50] + uniform(80, 6), 0), (points, 50)):
-            errors = self.run_tool("upload", name, "-", "--offset", offset, "--output", "json", exit_code=7, text=csv(other))
+            errors = self.run_tool("upload", name, "-", "--offset", offset, "--output", "json", exit_code=7,
+                                   text=csv(other))
             self.assertIn("has other points", errors)
         self.assertEqual(self.run_json("session", "show", name)["committed_points"], 100)
 
@@ -199,7 +203,8 @@ class SessionLife(unittest.TestCase):
         self.assertIn("MESH_NOT_READY", self.run_tool("download", name, "-o", self.folder / "a.vtu", "--output", "json",
                                                       exit_code=7))
         self.assertIn("--rho: ", self.run_tool("refine", name, "--rho", 0.1, exit_code=2))
-        self.assertIn("MISMATCH", self.run_tool("refine", name, "--expected-revision", 99, "--output", "json", exit_code=7))
+        self.assertIn("MISMATCH",
+                      self.run_tool("refine", name, "--expected-revision", 99, "--output", "json", exit_code=7))
 
     def test_the_server_tells_about_itself(self):
         self.assertEqual(self.run_tool("server", "health"), "serving\n")
@@ -215,13 +220,14 @@ class SessionLife(unittest.TestCase):
         environment = self.environment | {"PATH": f"{BIN}:{os.environ['PATH']}"}
         for block in blocks:
             script = "set -euo pipefail\n" + block.replace("127.0.0.1:7233", self.address)
-            done = subprocess.run(["bash", "-c", script], cwd=self.folder, env=environment, capture_output=True, text=True,
-                                  timeout=PATIENCE, check=False)
+            done = subprocess.run(["bash", "-c", script], cwd=self.folder, env=environment, capture_output=True,
+                                  text=True, timeout=PATIENCE, check=False)
             self.assertEqual(done.returncode, 0, (block, done.stdout, done.stderr))
         for file in ("land.msh", "part.vtu", "spot.vtu", "spot-quality.png", "coast.vtu", "finer.vtu"):
             self.assertGreater((self.folder / file).stat().st_size, 1000, file)
         self.run_tool("check", self.folder / "finer.vtu", "--size", 5)
-        self.assertEqual(self.run_json("session", "list", "--label", "project=coast"), [], "deleted by the last command")
+        self.assertEqual(self.run_json("session", "list", "--label", "project=coast"), [],
+                         "deleted by the last command")
 
     def test_the_example_of_the_library(self):
         mesh = self.folder / "example.npz"

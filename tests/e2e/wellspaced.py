@@ -54,7 +54,8 @@ def api():
     folder = tempfile.mkdtemp()
     atexit.register(shutil.rmtree, folder)
     protos = ROOT / "proto"
-    files = [path.relative_to(protos) for name in ("wellspace", "google") for path in sorted((protos / name).rglob("*.proto"))]
+    files = [path.relative_to(protos) for name in ("wellspace", "google")
+             for path in sorted((protos / name).rglob("*.proto"))]
     subprocess.run(["protoc", "--proto_path", protos, "--python_out", folder, "--grpc_python_out", folder,
                     "--plugin", "protoc-gen-grpc_python=" + shutil.which("grpc_python_plugin"), *files], check=True)
     sys.path.insert(0, folder)

@@ -49,6 +49,7 @@ class CheckTextTest(unittest.TestCase):
 
     def test_wide_line_of_a_document(self):
         self.assert_found({"docs/a.md": "# a\n\n" + "x " * 61 + "\n"}, "docs/a.md:3: ", "122 columns")
+        self.assert_found({"docs/a.md": "|wx| is " + "x " * 61 + "\n"}, "docs/a.md:1: ", "130 columns")
 
     def test_long_function(self):
         self.assert_found({"core/a.cc": function("Long", 61)}, "core/a.cc:1: ", "Long has 61 lines")
@@ -66,7 +67,7 @@ class CheckTextTest(unittest.TestCase):
         members = "".join(f"  std::vector<int> name{i}_;\n  bool flag{i}_ = false;\n" for i in range(15))
         text = "class Large final : public Base {\n public:\n  int Count() const { return count_; }\n\n private:\n"
         self.assert_found({"core/a.h": text + members + "  int last_;\n  int count_{0};\n};\n"}, "core/a.h:1: ",
-                          "Large has 32 members; at most 30")
+                          "Large has 32 private members; at most 30")
         self.assertEqual(self.run_with({"core/a.h": text + members + "};\nstruct B {\n  int last_;\n};\n"})[0], 0)
 
     def test_listed_function_that_is_no_longer_long(self):
@@ -80,11 +81,17 @@ class CheckTextTest(unittest.TestCase):
     def test_python_of_the_package(self):
         wide = "x = '" + "x" * 115 + "'\n"
         self.assert_found({"client/python/a.py": "x = 1\n" + wide}, "client/python/a.py:2: ", "121 columns")
-        self.assertEqual(self.run_with({"bench/a.py": wide})[0], 0)
         body = "    x = 1\n" * 60
-        self.assert_found({"examples/a.py": f"def long():\n    y = 1\n{body}"}, "examples/a.py:1: ", "long has 61 lines")
+        self.assert_found({"examples/a.py": f"def long():\n    y = 1\n{body}"}, "examples/a.py:1: ",
+                          "long has 61 lines")
         text = f'class A:\n  async def short(self):\n    """Two\n\n    lines."""\n{body}'
         self.assertEqual(self.run_with({"tests/client/a.py": text})[0], 0, "docstrings do not count")
+
+    def test_wide_line_of_python_and_of_a_script(self):
+        wide = "x" * 121 + "\n"
+        self.assert_found({"bench/a.py": "\n" + wide}, "bench/a.py:2: ", "121 columns")
+        self.assert_found({"scripts/a": "#!/bin/sh\n" + wide}, "scripts/a:2: ", "121 columns")
+        self.assertEqual(self.run_with({"scripts/a": wide, "scripts/b.txt": "#!/bin/sh\n" + wide})[0], 0)
 
     def test_subjects(self):
         script = SCRIPT.read_text(encoding="utf-8")

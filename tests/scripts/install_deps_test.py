@@ -11,7 +11,7 @@ SCRIPT = pathlib.Path(__file__).resolve().parents[2] / "deploy" / "install-deps.
 
 class InstallDepsTest(unittest.TestCase):
     def run_script(self, *groups, absent=()):
-        """Runs the script as root of a machine that lacks `absent`; returns the finished process and the apt-get calls."""
+        """Runs the script as root of a machine that lacks `absent`; returns the process and the apt-get calls."""
         with tempfile.TemporaryDirectory() as folder:
             bin_dir = pathlib.Path(folder)
             calls = bin_dir / "calls"

@@ -49,15 +49,16 @@ core::Criterion CriterionToCore(client::Criterion criterion) {
     case client::Criterion::kWellSpaced:
       return core::Criterion::kWellSpaced;
     case client::Criterion::kRadiusEdge:
+    case client::Criterion::kUnknown:  // which AddCriterion does not offer
       break;
   }
   return core::Criterion::kRadiusEdge;
 }
 
-Json ReportJson(const core::QualityReport& report, int dimension, bool has_weights,
-                const std::vector<formats::BoundaryPart>& boundary) {
-  Json json;
-  json["boundary"] = Json::array();
+client::Json ReportJson(const core::QualityReport& report, int dimension, bool has_weights,
+                        const std::vector<formats::BoundaryPart>& boundary) {
+  client::Json json;
+  json["boundary"] = client::Json::array();
   for (const formats::BoundaryPart& part : boundary) {
     json["boundary"].push_back({{"tag", part.tag}, {"name", part.name}, {"facets", part.facets}});
   }
@@ -196,12 +197,13 @@ struct CheckCommand {
                               std::span<const double> points) const;
   // Holds the mesh to its demands, its boundary too. `cloud`: the points of --cloud. `json`: the report.
   absl::Status Validate(const formats::Mesh& mesh, const core::MeshView& view, const WantedSizes& sizes,
-                        std::span<const double> cloud, Json& json) const;
+                        std::span<const double> cloud, client::Json& json) const;
   // The part of that about sizes and angles alone.
   absl::Status ValidateShapes(const core::MeshView& view, const WantedSizes& sizes,
                               std::span<const double> cloud) const;
   // Prints the end of the report, and returns the exit code. `json`: the report so far.
-  int Conclude(const absl::Status& violation, const CloudReport& cloud, const formats::Mesh& mesh, Json json) const;
+  int Conclude(const absl::Status& violation, const CloudReport& cloud, const formats::Mesh& mesh,
+               client::Json json) const;
   int Run();
 };
 
@@ -398,7 +400,7 @@ absl::Status CheckCommand::ValidateShapes(const core::MeshView& view, const Want
 }
 
 absl::Status CheckCommand::Validate(const formats::Mesh& mesh, const core::MeshView& view, const WantedSizes& sizes,
-                                    std::span<const double> cloud, Json& json) const {
+                                    std::span<const double> cloud, client::Json& json) const {
   if (surface.IsAsked() || (mesh.dimension == 3 && HasFeatures(mesh))) {
     WELLSPACE_RETURN_IF_ERROR(CheckOptionsOfDomain());
     WELLSPACE_RETURN_IF_ERROR(surface.Check(mesh, rho, format, json));
@@ -419,11 +421,11 @@ absl::Status CheckCommand::Validate(const formats::Mesh& mesh, const core::MeshV
 }
 
 int CheckCommand::Conclude(const absl::Status& violation, const CloudReport& cloud, const formats::Mesh& mesh,
-                           Json json) const {
+                           client::Json json) const {
   if (format == OutputFormat::kJson) {
     AddNotes(cloud, json);
     json["valid"] = violation.ok();
-    json["violation"] = violation.ok() ? Json(nullptr) : Json(std::string(violation.message()));
+    json["violation"] = violation.ok() ? client::Json(nullptr) : client::Json(std::string(violation.message()));
     PrintJson(json);
   } else if (!violation.ok()) {
     std::cout << "violation: " << std::string(violation.message()) << "\n";
@@ -471,7 +473,7 @@ int CheckCommand::Run() {
   const core::MeshView view = {
       .dimension = mesh->dimension, .points = mesh->points, .simplices = mesh->simplices, .weights = mesh->weights};
   absl::Status status = core::ValidateIndices(view);
-  Json json = Json::object();
+  client::Json json = client::Json::object();
   if (status.ok()) {
     const core::QualityReport report = core::MeasureQuality(view);
     if (format == OutputFormat::kJson) {

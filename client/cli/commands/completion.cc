@@ -30,7 +30,7 @@ void AddCompletionCommands(CLI::App& app, int& exit_code) {
       "Example:\n"
       "  wellspace manual | man -l -\n");
   const auto format = std::make_shared<std::string>("man");
-  manual->add_option("--format", *format, "For man, or as Markdown; default man")
+  manual->add_option("--format", *format, "For man, or as Markdown; default: man")
       ->check(CLI::IsMember({"man", "markdown"}));
   manual->callback([&app, format, &exit_code] {
     std::cout << (*format == "man" ? ManualPage(app, WELLSPACE_VERSION) : MarkdownManual(app));

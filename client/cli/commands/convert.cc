@@ -55,7 +55,7 @@ struct ConvertCommand {
   absl::Status ConvertMesh();
   absl::Status ConvertDomain();
   absl::Status ConvertSurface();
-  void Report(const Json& figures, CloudReport report, const std::vector<std::string>& losses) const;
+  void Report(const client::Json& figures, CloudReport report, const std::vector<std::string>& losses) const;
 };
 
 // Corners of .stl have always been points here.
@@ -127,10 +127,11 @@ absl::Status ConvertCommand::ConvertSurface() {
   return absl::OkStatus();
 }
 
-void ConvertCommand::Report(const Json& figures, CloudReport report, const std::vector<std::string>& losses) const {
+void ConvertCommand::Report(const client::Json& figures, CloudReport report,
+                            const std::vector<std::string>& losses) const {
   PrintNotes({.notes = losses}, format, /*quiet=*/false);
   if (format == OutputFormat::kJson) {
-    Json all = {{"input", input}, {"output", output.path}};
+    client::Json all = {{"input", input}, {"output", output.path}};
     all.update(figures);
     report.notes.insert(report.notes.end(), losses.begin(), losses.end());
     AddNotes(report, all);

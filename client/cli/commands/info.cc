@@ -17,7 +17,6 @@
 #include "client/cli/exit_codes.h"
 #include "client/cli/helpful_threads.h"
 #include "client/cli/interrupt.h"
-#include "client/cli/json.h"
 #include "client/cli/labelled_lines.h"
 #include "client/cli/meshing_options.h"
 #include "client/cli/progress_bar.h"
@@ -25,6 +24,7 @@
 #include "client/cli/surface_info.h"
 #include "client/cli/surface_options.h"
 #include "client/formats/mesh_or_cloud.h"
+#include "client/json/json.h"
 #include "core/base/status_macros.h"
 #include "core/input/surface_report.h"
 #include "core/validate/validate.h"
@@ -51,7 +51,7 @@ struct InfoCommand {
 };
 
 // The least or largest number of each axis; null without points.
-Json BoundOf(const formats::Mesh& mesh, bool is_low) {
+client::Json BoundOf(const formats::Mesh& mesh, bool is_low) {
   if (mesh.points.empty()) {
     return nullptr;
   }
@@ -64,7 +64,7 @@ Json BoundOf(const formats::Mesh& mesh, bool is_low) {
 }
 
 // name, min, max (null if all are missing) and how many values are missing.
-Json AttributeJson(const formats::PointAttribute& attribute) {
+client::Json AttributeJson(const formats::PointAttribute& attribute) {
   double low = std::numeric_limits<double>::infinity();
   double high = -low;
   uint64_t missing = 0;
@@ -75,8 +75,8 @@ Json AttributeJson(const formats::PointAttribute& attribute) {
   }
   const bool has_values = missing < attribute.values.size();
   return {{"name", attribute.name},
-          {"min", has_values ? Json(low) : Json(nullptr)},
-          {"max", has_values ? Json(high) : Json(nullptr)},
+          {"min", has_values ? client::Json(low) : client::Json(nullptr)},
+          {"max", has_values ? client::Json(high) : client::Json(nullptr)},
           {"missing", missing}};
 }
 
@@ -133,9 +133,9 @@ bool IsMeasurable(const formats::Mesh& mesh) {
 // The word for the measure of a simplex, or a facet.
 const char* MeasureName(int dimension) { return dimension == 3 ? "volume" : dimension == 2 ? "area" : "length"; }
 
-Json BoundaryJson(const formats::Mesh& mesh) {
+client::Json BoundaryJson(const formats::Mesh& mesh) {
   std::vector<int32_t> tags;
-  Json boundary = Json::array();
+  client::Json boundary = client::Json::array();
   for (const formats::BoundaryPart& part : mesh.boundary) {
     boundary.push_back({{"tag", part.tag}, {"name", part.name}, {"facets", part.facets}});
     tags.insert(tags.end(), part.facets, part.tag);
@@ -143,14 +143,14 @@ Json BoundaryJson(const formats::Mesh& mesh) {
   const auto d = static_cast<size_t>(mesh.dimension);
   if (!boundary.empty() && IsMeasurable(mesh) && mesh.facets.size() == d * tags.size()) {
     std::map<int32_t, double> sizes = MeasuresBy([&](size_t f) { return tags[f]; }, mesh.facets, d, mesh);
-    for (Json& part : boundary) {
+    for (client::Json& part : boundary) {
       part[MeasureName(mesh.dimension - 1)] = sizes[part["tag"]];
     }
   }
   return boundary;
 }
 
-Json RegionsJson(const formats::Mesh& mesh) {
+client::Json RegionsJson(const formats::Mesh& mesh) {
   std::map<int32_t, uint64_t> sizes;
   for (const int32_t region : mesh.simplex_regions) {
     ++sizes[region];
@@ -158,7 +158,7 @@ Json RegionsJson(const formats::Mesh& mesh) {
   if (mesh.simplex_regions.empty() && mesh.regions.size() == 1) {
     sizes[mesh.regions[0].id] = mesh.View().simplex_count();  // all are of the only one
   }
-  Json regions = Json::array();
+  client::Json regions = client::Json::array();
   for (const formats::Region& region : mesh.regions) {
     regions.push_back({{"id", region.id}, {"name", region.name}, {"simplices", sizes[region.id]}});
   }
@@ -168,7 +168,7 @@ Json RegionsJson(const formats::Mesh& mesh) {
     };
     std::map<int32_t, double> measures =
         MeasuresBy(region_of, mesh.simplices, static_cast<size_t>(mesh.dimension) + 1, mesh);
-    for (Json& region : regions) {
+    for (client::Json& region : regions) {
       region[MeasureName(mesh.dimension)] = measures[region["id"]];
     }
   }
@@ -176,7 +176,7 @@ Json RegionsJson(const formats::Mesh& mesh) {
 }
 
 // Of the simplices; null without any, or if indices are wrong, which `check` tells more of.
-Json QualityJson(const formats::Mesh& mesh) {
+client::Json QualityJson(const formats::Mesh& mesh) {
   const core::MeshView view = {
       .dimension = mesh.dimension, .points = mesh.points, .simplices = mesh.simplices, .weights = mesh.weights};
   if (mesh.simplices.empty() || !core::ValidateIndices(view).ok()) {
@@ -188,9 +188,9 @@ Json QualityJson(const formats::Mesh& mesh) {
           {"max_angle_deg", report.max_angle_deg}};
 }
 
-Json InfoJson(const std::string& path, const formats::MeshOrCloud& read) {
+client::Json InfoJson(const std::string& path, const formats::MeshOrCloud& read) {
   const formats::MeshView view = read.View();
-  Json json;
+  client::Json json;
   json["file"] = path;
   json["kind"] = read.is_mesh ? "mesh" : "cloud";
   json["format"] = read.format;
@@ -198,7 +198,7 @@ Json InfoJson(const std::string& path, const formats::MeshOrCloud& read) {
   json[read.is_mesh ? "vertices" : "points"] = view.vertex_count();
   json["low"] = BoundOf(read.mesh, /*is_low=*/true);
   json["high"] = BoundOf(read.mesh, /*is_low=*/false);
-  json["attributes"] = Json::array();
+  json["attributes"] = client::Json::array();
   for (const formats::PointAttribute& attribute : read.attributes) {
     json["attributes"].push_back(AttributeJson(attribute));
   }
@@ -214,18 +214,18 @@ Json InfoJson(const std::string& path, const formats::MeshOrCloud& read) {
 }
 
 // "3 north", or the number alone.
-std::string Numbered(const Json& row, const char* number) {
+std::string Numbered(const client::Json& row, const char* number) {
   const std::string name = row["name"];
   return absl::StrCat(row[number].get<int32_t>(), name.empty() ? "" : " ", name);
 }
 
 // ", area 0.5", or nothing where it is not known.
-std::string MeasureText(const Json& row, int dimension) {
+std::string MeasureText(const client::Json& row, int dimension) {
   const char* const name = MeasureName(dimension);
   return row.contains(name) ? absl::StrFormat(", %s %.9g", name, row[name].get<double>()) : "";
 }
 
-void PrintInfo(const Json& json) {
+void PrintInfo(const client::Json& json) {
   PrintLine("file", json["file"]);
   PrintLine("kind", absl::StrCat(std::string(json["kind"]), ", ", std::string(json["format"]), ", ",
                                  json["dimension"].get<int>(), "-D"));
@@ -239,7 +239,7 @@ void PrintInfo(const Json& json) {
     PrintLine("from", Numbers(json["low"]));
     PrintLine("to", Numbers(json["high"]));
   }
-  for (const Json& attribute : json["attributes"]) {
+  for (const client::Json& attribute : json["attributes"]) {
     const uint64_t missing = attribute["missing"];
     PrintLine(
         absl::StrCat("attribute"),
@@ -252,15 +252,15 @@ void PrintInfo(const Json& json) {
   if (!is_mesh) {
     return;
   }
-  for (const Json& part : json["boundary"]) {
+  for (const client::Json& part : json["boundary"]) {
     PrintLine("boundary", absl::StrCat(Numbered(part, "tag"), ": ", WithThousands(part["facets"]), " facets",
                                        MeasureText(part, json["dimension"].get<int>() - 1)));
   }
-  for (const Json& region : json["regions"]) {
+  for (const client::Json& region : json["regions"]) {
     PrintLine("region", absl::StrCat(Numbered(region, "id"), ": ", WithThousands(region["simplices"]), " simplices",
                                      MeasureText(region, json["dimension"])));
   }
-  if (const Json& quality = json["quality"]; !quality.is_null()) {
+  if (const client::Json& quality = json["quality"]; !quality.is_null()) {
     const char* angle = json["dimension"] == 2 ? "angles" : "dihedral angles";
     PrintLine(angle, absl::StrFormat("%.6g\u00b0 to %.6g\u00b0", quality["min_angle_deg"].get<double>(),
                                      quality["max_angle_deg"].get<double>()));
@@ -278,7 +278,7 @@ absl::Status InfoCommand::RunOnSurface(int& exit_code) {
   }
   const CloudReport notes = ReportOf(cloud_options, surface.notes, 0);
   PrintNotes(notes, format, /*quiet=*/false);
-  Json json = SurfaceJson(surface_options.FilesFrom(path), surface, features, *report);
+  client::Json json = SurfaceJson(surface_options.FilesFrom(path), surface, features, *report);
   if (format == OutputFormat::kJson) {
     AddNotes(notes, json);
     PrintJson(json);
@@ -299,7 +299,7 @@ absl::Status InfoCommand::Run(int& exit_code) {
   WELLSPACE_ASSIGN_OR_RETURN(const formats::MeshOrCloud read, formats::ReadMeshOrCloud(path, cloud_options));
   const CloudReport report = ReportOf(cloud_options, read.notes, read.skipped);
   PrintNotes(report, format, /*quiet=*/false);
-  Json json = InfoJson(path, read);
+  client::Json json = InfoJson(path, read);
   if (format == OutputFormat::kJson) {
     AddNotes(report, json);
     PrintJson(json);

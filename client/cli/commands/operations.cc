@@ -40,7 +40,7 @@ absl::StatusOr<client::Operation> Follow(client::Client& client, const RemoteCom
   const std::stop_callback forward(call.stop, [&stop] { stop.request_stop(); });
   const auto on_progress = [&](const client::Progress& progress) {
     if (prints_events && remote.json()) {
-      PrintJson(ProgressJson(progress), /*indented=*/false);
+      PrintJson(client::ProgressJson(progress), /*indented=*/false);
       if (!std::cout) {
         stop.request_stop();  // later lines could not be printed either
       }
@@ -54,7 +54,7 @@ absl::StatusOr<client::Operation> Follow(client::Client& client, const RemoteCom
 
 void PrintEnd(const RemoteCommand& remote, const client::Operation& operation, bool indented) {
   if (remote.json()) {
-    PrintJson(OperationJson(operation), indented);
+    PrintJson(client::OperationJson(operation), indented);
   } else if (operation.state == client::OperationState::kSucceeded && !remote.quiet()) {
     std::cout << client::Printable(operation.name) << " succeeded: " << WithThousands(operation.progress.vertices)
               << " vertices, revision " << operation.mesh_revision << "\n";
@@ -68,9 +68,9 @@ absl::Status PrintJobs(const RemoteCommand& remote, client::Client& client, cons
   WELLSPACE_ASSIGN_OR_RETURN(const client::Overview overview,
                              client::GetOverview(client, {.most = kAll, .busy_alone = true}, call));
   if (remote.json()) {
-    Json operations = Json::array();
+    client::Json operations = client::Json::array();
     for (const client::SessionWithOperation& one : overview.sessions) {
-      operations.push_back(OperationJson(*one.operation));
+      operations.push_back(client::OperationJson(*one.operation));
     }
     PrintJson({{"running_jobs", info.running_jobs},
                {"queued_jobs", info.queued_jobs},
@@ -89,10 +89,11 @@ absl::Status PrintJobs(const RemoteCommand& remote, client::Client& client, cons
   for (const client::SessionWithOperation& one : overview.sessions) {
     const client::Operation& operation = *one.operation;
     std::cout << absl::StrFormat(
-        kRow, client::Printable(operation.name), StateName(operation.state),
+        kRow, client::Printable(operation.name), client::StateName(operation.state),
         client::Printable(operation.progress.phase),
         absl::StrCat(static_cast<int>(100 * std::clamp(operation.progress.fraction, 0.0, 1.0)), "%"),
-        WithThousands(operation.progress.vertices), TimeText(operation.start_time.value_or(operation.create_time)));
+        WithThousands(operation.progress.vertices),
+        client::TimeText(operation.start_time.value_or(operation.create_time)));
   }
   return absl::OkStatus();
 }
@@ -178,7 +179,7 @@ int OperationCommand::Refine() {
                            const Interrupt& interrupt) -> absl::Status {
     WELLSPACE_ASSIGN_OR_RETURN(const client::Operation started, Start(client, call, interrupt));
     if (detach) {
-      remote.json() ? PrintJson(OperationJson(started))
+      remote.json() ? PrintJson(client::OperationJson(started))
                     : static_cast<void>(std::cout << client::Printable(started.name) << "\n");
       return absl::OkStatus();
     }
@@ -220,9 +221,9 @@ int OperationCommand::Cancel() const {
     WELLSPACE_ASSIGN_OR_RETURN(const client::Operation ended,
                                client.WatchOperation(operation, nullptr, std::nullopt, call));
     if (remote.json()) {
-      PrintJson(OperationJson(ended));
+      PrintJson(client::OperationJson(ended));
     } else if (!remote.quiet()) {
-      std::cout << client::Printable(ended.name) << " " << StateName(ended.state) << "\n";
+      std::cout << client::Printable(ended.name) << " " << client::StateName(ended.state) << "\n";
     }
     return absl::OkStatus();
   });

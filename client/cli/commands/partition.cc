@@ -9,11 +9,11 @@
 #include "client/cli/commands/commands.h"
 #include "client/cli/exit_codes.h"
 #include "client/cli/interrupt.h"
-#include "client/cli/json.h"
 #include "client/cli/mesh_paths.h"
 #include "client/cli/options.h"
 #include "client/cli/part_files.h"
 #include "client/cli/remote_command.h"
+#include "client/json/json.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::cli {

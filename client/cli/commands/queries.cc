@@ -57,7 +57,7 @@ std::string LinesOf(const client::CellBatch& cells, bool json) {
   size_t node = 0;
   size_t neighbour = 0;
   for (size_t i = 0; i < cells.vertices.size(); ++i) {
-    Json nodes = Json::array();
+    client::Json nodes = client::Json::array();
     std::vector<std::string> node_texts;
     for (uint32_t k = 0; k < cells.node_counts[i]; ++k, node += cells.dimension) {
       const std::vector<double> coordinates(cells.nodes.begin() + node, cells.nodes.begin() + node + cells.dimension);
@@ -79,9 +79,9 @@ std::string LinesOf(const client::CellBatch& cells, bool json) {
     neighbour += cells.neighbour_counts[i];
     const bool is_whole = std::isinf(cells.clip_radii[i]);
     if (json) {
-      Json cell;
+      client::Json cell;
       cell["vertex"] = cells.vertices[i];
-      cell["clip_radius"] = is_whole ? Json(nullptr) : Json(cells.clip_radii[i]);
+      cell["clip_radius"] = is_whole ? client::Json(nullptr) : client::Json(cells.clip_radii[i]);
       cell["is_clipped"] = static_cast<bool>(cells.is_clipped[i]);
       cell["nodes"] = std::move(nodes);
       cell["neighbours"] = neighbours;
@@ -117,7 +117,7 @@ absl::Status CellsCommand::Query(client::Client& client, const client::CallOptio
             ++answered;
             std::string line;
             if (remote.json()) {
-              line = Json{{"vertex", vertex}, {"distance", distance}}.dump();
+              line = client::Json{{"vertex", vertex}, {"distance", distance}}.dump();
             } else {
               absl::StrAppend(&line, vertex, " ");
               formats::AppendNumber(distance, line);
@@ -219,7 +219,7 @@ absl::Status AddCommand::Add(client::Client& client, client::CallOptions call, c
       call);
   // Added vertices stay: their numbers are told, whatever became of the rest.
   if (remote.json() && added.ok()) {
-    Json json = {{"vertices", vertices}, {"revision", added->revision}};
+    client::Json json = {{"vertices", vertices}, {"revision", added->revision}};
     AddNotes(report, json);
     PrintJson(json);
   } else {

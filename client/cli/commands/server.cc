@@ -20,8 +20,8 @@ absl::Status PrintInfo(const RemoteCommand& remote, client::Client& client, cons
   WELLSPACE_ASSIGN_OR_RETURN(const client::ServerInfo info, client.GetServerInfo(call));
   const std::string server = remote.address().empty() ? "embedded" : remote.address();
   if (remote.json()) {
-    Json json = {{"server", server}};
-    json.update(ServerInfoJson(info));
+    client::Json json = {{"server", server}};
+    json.update(client::ServerInfoJson(info));
     PrintJson(json);
     return absl::OkStatus();
   }

@@ -18,6 +18,7 @@
 #include "client/cli/statistics.h"
 #include "client/error_details.h"
 #include "client/printable.h"
+#include "client/rule_names.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::cli {
@@ -28,7 +29,8 @@ std::string LabelsText(const client::Labels& labels) {
 }
 
 std::string QualityText(const client::MeshOptions& parameters) {
-  std::string text = absl::StrFormat("%s, rho %g", CriterionName(parameters.criterion), parameters.rho.value_or(0));
+  std::string text =
+      absl::StrFormat("%s, rho %g", client::CriterionName(parameters.criterion), parameters.rho.value_or(0));
   if (parameters.max_circumradius.has_value()) {
     absl::StrAppendFormat(&text, ", size %g", *parameters.max_circumradius);
   }
@@ -49,14 +51,14 @@ std::string QualityText(const client::MeshOptions& parameters) {
 
 void PrintSession(const client::Session& session, bool json) {
   if (json) {
-    PrintJson(SessionJson(session));
+    PrintJson(client::SessionJson(session));
     return;
   }
   const auto print = [](const char* name, const std::string& value) {
     std::cout << absl::StrFormat("%-16s %s\n", name, client::Printable(value));
   };
   print("name", session.name);
-  print("state", StateName(session.state));
+  print("state", client::StateName(session.state));
   print("dimension", absl::StrCat(session.parameters.dimension));
   print("domain", session.parameters.domain_low.empty()
                       ? absl::StrFormat("of the points, and a margin of %g", session.parameters.margin)
@@ -69,16 +71,16 @@ void PrintSession(const client::Session& session, bool json) {
   print("points", WithThousands(session.committed_points));
   if (session.faces.has_value()) {
     print("segments", WithThousands(session.segment_count));
-    print("faces",
-          absl::StrCat(FaceRuleName(*session.faces), ", ", WithThousands(session.seed_count), " holes and regions",
-                       session.crossings == client::CrossingRule::kSplit  ? ", crossings split"
-                       : session.crossings == client::CrossingRule::kSnap ? ", snapped"
-                                                                          : ""));
+    print("faces", absl::StrCat(client::FaceRuleName(*session.faces), ", ", WithThousands(session.seed_count),
+                                " holes and regions",
+                                session.crossings == client::CrossingRule::kSplit  ? ", crossings split"
+                                : session.crossings == client::CrossingRule::kSnap ? ", snapped"
+                                                                                   : ""));
   }
   if (session.surface.has_value()) {
     print("triangles", WithThousands(session.triangle_count));
-    print("solids", absl::StrCat(SolidRuleName(session.surface->solids), ", ", WithThousands(session.seed_count),
-                                 " holes and regions"));
+    print("solids", absl::StrCat(client::SolidRuleName(session.surface->solids), ", ",
+                                 WithThousands(session.seed_count), " holes and regions"));
   }
   if (session.size_count > 0) {
     print("sizes", absl::StrCat("at ", WithThousands(session.size_count), " points"));
@@ -90,8 +92,8 @@ void PrintSession(const client::Session& session, bool json) {
   print("last operation", session.last_operation.empty() ? "none" : session.last_operation);
   print("labels", LabelsText(session.labels));
   print("ttl", absl::StrFormat("%g s", absl::ToDoubleSeconds(session.ttl)));
-  print("created", TimeText(session.create_time));
-  print("expires", TimeText(session.expire_time));
+  print("created", client::TimeText(session.create_time));
+  print("expires", client::TimeText(session.expire_time));
 }
 
 // `status` with the option that the server blames under another name.
@@ -142,7 +144,7 @@ int SessionCommand::Create() {
       return ExplainSettings(parameters.Explain(created.status()));
     }
     if (remote.json()) {
-      PrintJson(SessionJson(*created));
+      PrintJson(client::SessionJson(*created));
     } else {
       std::cout << client::Printable(created->name) << "\n";
     }
@@ -152,7 +154,7 @@ int SessionCommand::Create() {
 
 int SessionCommand::List() {
   return remote.Run([&](client::Client& client, const client::CallOptions& call, const Interrupt&) -> absl::Status {
-    Json json = Json::array();
+    client::Json json = client::Json::array();
     client::PageOptions page;
     uint64_t listed = 0;
     do {
@@ -168,11 +170,11 @@ int SessionCommand::List() {
       for (const client::Session& one : result.sessions) {
         ++listed;
         if (remote.json()) {
-          json.push_back(SessionJson(one));
+          json.push_back(client::SessionJson(one));
         } else {
           std::cout << absl::StrFormat("%-44s %-9s %12s %12s  %-20s  %s\n", client::Printable(one.name),
-                                       StateName(one.state), WithThousands(one.committed_points),
-                                       WithThousands(one.vertex_count), TimeText(one.expire_time),
+                                       client::StateName(one.state), WithThousands(one.committed_points),
+                                       WithThousands(one.vertex_count), client::TimeText(one.expire_time),
                                        LabelsText(one.labels));
         }
       }

@@ -178,7 +178,7 @@ absl::Status UploadCommand::UploadCloud(client::Client& client, const client::Se
                        [&cloud](uint64_t point) { return cloud.Origin(point); });
   }
   if (remote.json()) {
-    Json json = {
+    client::Json json = {
         {"session", session}, {"committed_points", uploaded->committed_points}, {"revision", uploaded->revision}};
     AddNotes(report, json);
     PrintJson(json);
@@ -255,11 +255,11 @@ absl::Status UploadCommand::UploadSurface(client::Client& client, const client::
 void UploadCommand::Print(const client::Uploaded& uploaded, const char* what, const char* field, uint64_t count,
                           uint64_t seeds, uint64_t revision, const CloudReport& report) const {
   if (remote.json()) {
-    Json json = {{"session", session},
-                 {"committed_points", uploaded.committed_points},
-                 {field, count},
-                 {"seed_count", seeds},
-                 {"revision", revision}};
+    client::Json json = {{"session", session},
+                         {"committed_points", uploaded.committed_points},
+                         {field, count},
+                         {"seed_count", seeds},
+                         {"revision", revision}};
     AddNotes(report, json);
     PrintJson(json);
   } else if (!remote.quiet()) {
@@ -344,19 +344,19 @@ absl::Status DownloadCommand::DownloadPart(client::Client& client, const client:
   const client::MeshHeader& header = collector.header();
   const client::PartHeader& of_whole = *header.part;
   if (remote.json()) {
-    Json json = {{"session", session},
-                 {"revision", header.revision},
-                 {"parts", of_whole.parts},
-                 {"part", of_whole.part},
-                 {"vertices", header.vertex_count},
-                 {"own_vertices", of_whole.own_vertex_count},
-                 {"simplices", header.simplex_count},
-                 {"own_simplices", of_whole.own_simplex_count},
-                 {"facets", header.facet_count},
-                 {"whole_vertices", of_whole.whole_vertex_count},
-                 {"whole_simplices", of_whole.whole_simplex_count},
-                 {"whole_facets", of_whole.whole_facet_count},
-                 {"notes", notes}};
+    client::Json json = {{"session", session},
+                         {"revision", header.revision},
+                         {"parts", of_whole.parts},
+                         {"part", of_whole.part},
+                         {"vertices", header.vertex_count},
+                         {"own_vertices", of_whole.own_vertex_count},
+                         {"simplices", header.simplex_count},
+                         {"own_simplices", of_whole.own_simplex_count},
+                         {"facets", header.facet_count},
+                         {"whole_vertices", of_whole.whole_vertex_count},
+                         {"whole_simplices", of_whole.whole_simplex_count},
+                         {"whole_facets", of_whole.whole_facet_count},
+                         {"notes", notes}};
     PrintJson(json);
     return absl::OkStatus();
   }

@@ -95,7 +95,7 @@ absl::Status ViewCommand::View() const {
   }
   const bool is_open = page_path.empty() && OpenInBrowser(path);
   if (format == OutputFormat::kJson) {
-    Json figures = {{"mesh", mesh_path}, {"page", path}, {"opened", is_open}};
+    client::Json figures = {{"mesh", mesh_path}, {"page", path}, {"opened", is_open}};
     AddNotes(report, figures);
     PrintJson(figures);
   } else if (page_path.empty()) {

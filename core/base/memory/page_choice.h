@@ -1,4 +1,4 @@
-// Whether memory is brought in by large pages or by small ones.
+// The choice of large or small pages for memory.
 #ifndef WELLSPACE_CORE_BASE_MEMORY_PAGE_CHOICE_H_
 #define WELLSPACE_CORE_BASE_MEMORY_PAGE_CHOICE_H_
 

@@ -1,4 +1,4 @@
-// Where a vertex is in a domain of the plane: a point of a segment, or inside a face. PlanarDomain keeps places of
+// The place of a vertex in a domain of the plane: a point of a segment, or inside a face. PlanarDomain keeps places of
 // vertices, requests carry them, and points that are added get them (PointPlacer).
 #ifndef WELLSPACE_CORE_REFINE_PLANE_PLANE_PLACE_H_
 #define WELLSPACE_CORE_REFINE_PLANE_PLANE_PLACE_H_

@@ -1,5 +1,5 @@
-// Where on a segment a new vertex goes: at the distance that another segment has it, at a round one, or in the middle
-// third. Called by PlaneRules for requests, and for the records of them.
+// The place of a new vertex on a segment: at the distance that another segment has it, at a round one, or in the middle
+// third. PlaneRules asks for it for requests, and for the records of them.
 #ifndef WELLSPACE_CORE_REFINE_PLANE_SPLIT_PLACE_H_
 #define WELLSPACE_CORE_REFINE_PLANE_SPLIT_PLACE_H_
 

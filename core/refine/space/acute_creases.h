@@ -71,6 +71,7 @@ struct AcuteCreases {
   // Whether there is no acute curve and corner.
   bool IsEmpty() const { return shields_.empty(); }
 
+  // For tests.
   std::span<const Strand> StrandsOfGroup(uint32_t group) const {
     return std::span(strands).subspan(first_of_group[group], first_of_group[group + 1] - first_of_group[group]);
   }

@@ -1,4 +1,4 @@
-// How far apart vertices on an acute curve are.
+// Distances between vertices on an acute curve.
 #ifndef WELLSPACE_CORE_REFINE_SPACE_CREASE_SPACING_H_
 #define WELLSPACE_CORE_REFINE_SPACE_CREASE_SPACING_H_
 

@@ -1,4 +1,4 @@
-// How far patches that bend are from the facets that stand beside acute creases.
+// Distances of patches that bend from the facets beside acute creases.
 #ifndef WELLSPACE_CORE_REFINE_SPACE_PATCH_BENDS_H_
 #define WELLSPACE_CORE_REFINE_SPACE_PATCH_BENDS_H_
 

@@ -1,5 +1,5 @@
-// Where a vertex is in a domain in space: on the surface, or in a solid. SpatialDomain keeps the places of vertices,
-// and requests carry them.
+// The place of a vertex in a domain in space: on the surface, or in a solid. SpatialDomain keeps the places of
+// vertices, and requests carry them.
 #ifndef WELLSPACE_CORE_REFINE_SPACE_SPACE_PLACE_H_
 #define WELLSPACE_CORE_REFINE_SPACE_SPACE_PLACE_H_
 

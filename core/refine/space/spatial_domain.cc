@@ -23,7 +23,6 @@ SpatialDomain::SpatialDomain(SurfaceComplex complex, Solids solids, SurfaceCurve
       solids_(std::move(solids)),
       curves_(std::move(curves)),
       roles_(solids_.count),
-      corner_vertices_(curves_.corners.size(), kNoVertex),
       chains_(curves_.curve_count()) {
   if (curves_.first_point.empty()) {
     curves_.first_point.push_back(0);
@@ -246,7 +245,6 @@ void SpatialDomain::AddVertex(const SpacePlace& place) {
   const VertexId v{vertex_count()};
   places_.push_back(place);
   if (place.kind == SpacePlace::Kind::kCorner) {
-    corner_vertices_[place.number] = v;
     for (const CurveEnd& end : EndsAt(place.number)) {
       chains_[end.curve].emplace(end.is_last ? LengthOf(end.curve) : 0, v);
     }

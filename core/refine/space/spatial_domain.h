@@ -179,8 +179,6 @@ class SpatialDomain {
   void MoveIntoSolid(VertexId v, uint32_t solid) { places_[Index(v)].number = solid; }
   uint32_t vertex_count() const { return static_cast<uint32_t>(places_.size()); }
   const SpacePlace& PlaceOf(VertexId v) const { return places_[Index(v)]; }
-  // The vertex at a corner; kNoVertex if it has none.
-  VertexId VertexAt(uint32_t corner) const { return corner_vertices_[corner]; }
 
   // Subsegments.
 
@@ -270,7 +268,6 @@ class SpatialDomain {
   AcuteCreases creases_;
 
   HugeVector<SpacePlace> places_;  // by vertex
-  std::vector<VertexId> corner_vertices_;
   std::vector<std::map<double, VertexId>>
       chains_;             // by curve and strand: the vertices by arc; of a loop the first one at both ends
   SubsegmentBalls balls_;  // of curves; known from MakeAllPending on, until a vertex is moved along its curve

@@ -103,7 +103,7 @@ class SurfaceInCell {
     }
   }
 
-  // What may be added to the bisector between the vertices of two faces.
+  // The slack of the bisector between the vertices of two faces.
   double RoomBetween(const Face& face, const Face& other) const {
     return kRoom * (face.offset + other.offset) + kRounding * size_ * (face.length + other.length);
   }

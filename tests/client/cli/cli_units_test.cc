@@ -16,12 +16,12 @@
 #include "client/cli/exit_codes.h"
 #include "client/cli/helpful_threads.h"
 #include "client/cli/interrupt.h"
-#include "client/cli/json.h"
 #include "client/cli/meshing_options.h"
 #include "client/cli/options.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/statistics.h"
 #include "client/formats/io/output_file.h"
+#include "client/json/json.h"
 #include "client/json/statistics.h"
 #include "client/time_left.h"
 #include "tests/support/temporary_folder.h"
@@ -101,7 +101,7 @@ TEST(TimeLeftTest, TextIsRoundedUp) {
 }
 
 TEST(JsonTextTest, HasNoControlCharactersAndNoBytesThatAreNoText) {
-  EXPECT_EQ(JsonText({{"a", "\x1b[2J\x7f\xc2\x9b\xc3\xa9\xff"}}, /*indented=*/false),
+  EXPECT_EQ(client::JsonText({{"a", "\x1b[2J\x7f\xc2\x9b\xc3\xa9\xff"}}, /*indented=*/false),
             "{\"a\":\"\\u001b[2J\\u007f\\u009b\xc3\xa9\xef\xbf\xbd\"}");
 }
 

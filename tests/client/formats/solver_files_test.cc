@@ -1,5 +1,5 @@
-// Files for solvers and viewers that Wellspace does not read back: .su2, .inp, .vtk and .xdmf. That they do read it is
-// the business of interoperability_test.py and programs_test.py.
+// Files for solvers and viewers: .su2, .inp and .xdmf, which Wellspace does not read back, and .vtk. What the programs
+// themselves read is tested by interoperability_test.py and programs_test.py.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>

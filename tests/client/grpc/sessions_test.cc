@@ -106,6 +106,38 @@ TEST(Sessions, CreateSendsAllAndARequestIdOfItsOwn) {
   EXPECT_EQ(requests[2].request_id(), "mine");
 }
 
+// What rho bounds there is not told as something else, nor asked for as something else.
+TEST(Sessions, ACriterionOfANewerServerIsUnknown) {
+  FakeServer server;
+  server.sessions.get = [](const v1::GetSessionRequest&, v1::GetSessionResponse& response) {
+    *response.mutable_session() = MakeSession();
+    response.mutable_session()->mutable_parameters()->set_criterion(static_cast<v1::Criterion>(1000));
+    return grpc::Status::OK;
+  };
+  std::vector<v1::CreateSessionRequest> requests;
+  server.sessions.create = [&requests](const v1::CreateSessionRequest& request, v1::CreateSessionResponse& response) {
+    requests.push_back(request);
+    *response.mutable_session() = MakeSession();
+    response.mutable_session()->mutable_parameters()->clear_criterion();
+    return grpc::Status::OK;
+  };
+  Client client = server.Client();
+  const absl::StatusOr<Session> session = client.GetSession(kSession);
+  ASSERT_TRUE(session.ok()) << session.status();
+  EXPECT_EQ(session->parameters.criterion, Criterion::kUnknown);
+  for (const Criterion criterion : {Criterion::kUnknown, Criterion::kRadiusEdge, Criterion::kWellSpaced}) {
+    SessionOptions options;
+    options.parameters.criterion = criterion;
+    const absl::StatusOr<Session> created = client.CreateSession(options);
+    ASSERT_TRUE(created.ok()) << created.status();
+    EXPECT_EQ(created->parameters.criterion, Criterion::kRadiusEdge) << "the default";
+  }
+  ASSERT_THAT(requests, SizeIs(3));
+  EXPECT_FALSE(v1::Criterion_IsValid(requests[0].parameters().criterion())) << "a value that every server refuses";
+  EXPECT_EQ(requests[1].parameters().criterion(), v1::CRITERION_RADIUS_EDGE);
+  EXPECT_EQ(requests[2].parameters().criterion(), v1::CRITERION_WELL_SPACED);
+}
+
 TEST(Sessions, GetListUpdateDelete) {
   FakeServer server;
   server.sessions.get = [](const v1::GetSessionRequest& request, v1::GetSessionResponse& response) {

@@ -69,6 +69,12 @@ class ParametersTest(Case):
         self.assertEqual(read, {name: value for name, value in given.items() if name in read})
         self.assertEqual(len(read), len(given) - 2)
 
+    def test_a_criterion_of_a_newer_server_is_unknown(self):
+        message = self.filled()
+        for number, name in ((0, "radius-edge"), (1, "radius-edge"), (2, "well-spaced"), (1000, "unknown")):
+            message.criterion = number
+            self.assertEqual(_parameters.read(message)["criterion"], name)
+
     def test_signatures_and_docstrings_have_all(self):
         names = [*_parameters.Parameters.__annotations__]
         segments = [*_plane.PlaneArguments.__annotations__]

@@ -125,7 +125,7 @@ class FilesTest(Case):
         for mesh in (wellspace.mesh(spot(), size=0.4), outlet, wellspace.mesh(uniform(30, 3), pump_weights=True)):
             mesh.save(self.folder / "mesh.npz")
             for suffix in sorted(FORMATS):
-                if suffix in (".14", ".grd", ".2dm") and mesh.points.shape[1] == 3:
+                if suffix in (".14", ".grd", ".gr3", ".2dm") and mesh.points.shape[1] == 3:
                     continue
                 with self.subTest(suffix, d=mesh.points.shape[1]):
                     (self.folder / "own").mkdir(exist_ok=True)
@@ -139,7 +139,16 @@ class FilesTest(Case):
         manual = self.tool("manual", "--format", "markdown").split("### `wellspace convert")[1].replace("\\|", "|")
         told = re.search(r"--format ([a-z0-9|]+)", manual).group(1).split("|")
         of_names = {"msh41": ".msh", "msh22": ".msh", "medit": ".mesh", "abaqus": ".inp", "adcirc": ".14"}
-        self.assertEqual({of_names.get(name, "." + name) for name in told}, FORMATS - {".grd"} | {".npz"})
+        others = {".hdf", ".ele", ".grd", ".gr3"}  # further extensions of formats with several
+        self.assertEqual({of_names.get(name, "." + name) for name in told}, FORMATS - others | {".npz"})
+
+    def test_the_extensions_are_all_of_the_tool(self):
+        wellspace.mesh(uniform(20, 2)).save(self.folder / "mesh.npz")
+        command = [TOOL, "convert", self.folder / "mesh.npz", self.folder / "mesh.none"]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
+        told = re.search(r"expected one of (.*), or the name of a format", done.stderr)
+        self.assertIsNotNone(told, done.stderr)
+        self.assertEqual(set(told.group(1).split(", ")), FORMATS | {".npz"})
 
     def test_meshes_of_other_formats_are_read(self):
         mesh = wellspace.mesh(SQUARE, segments=RING, markers=[7, 7, 0, 0], regions=[(0.5, 0.5, 4)], edge_length=0.3)

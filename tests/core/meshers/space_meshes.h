@@ -81,9 +81,8 @@ inline double DepthIn(const Simplex<3>& corners, const Point<3>& p) {
 }
 
 // Checks, by a look at pairs, that the tetrahedra are Delaunay among all vertices, but by rounding at acute creases;
-// that facets are those sides that
-// belong to one tetrahedron or to two of other regions, and meet in pairs at edges that are no ridges; and that every
-// vertex is used.
+// that facets are those sides that belong to one tetrahedron or to two of other regions, and meet in pairs at edges
+// that are no ridges; and that every vertex is used.
 inline void ExpectConforming(const Mesh& mesh) {
   std::map<Facet, std::set<int32_t>> regions_at;
   std::map<Facet, int> tetrahedra_at;

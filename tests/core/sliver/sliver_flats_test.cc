@@ -154,7 +154,7 @@ TEST_P(SliverFlatsTest, AreRepairedAtEveryScaleAndTurn) {
     const std::vector<double> cloud = Placed(points, angle, scale, shift);
     const Mesh mesh = MeshOf({}, cloud);
     EXPECT_EQ(mesh.statistics.slivers_left, 0);
-    EXPECT_TRUE(mesh.statistics.slivers_are_asked_about);
+    EXPECT_TRUE(mesh.statistics.slivers_wanted);
     const absl::Status valid = Validate(mesh, cloud, 2, 12);
     EXPECT_TRUE(valid.ok()) << valid;
   }
@@ -229,11 +229,11 @@ TEST(SliverLeftTest, IsNamedWithTheReason) {
 TEST(SliverLeftTest, NothingIsSaidOnlyWhereNothingWasAsked) {
   const std::vector<double> cloud = Placed(Torus(10, 20), 0, 1, {0, 0, 0});
   MeshParameters parameters;
-  EXPECT_TRUE(MeshOf(parameters, cloud).statistics.slivers_are_asked_about);
+  EXPECT_TRUE(MeshOf(parameters, cloud).statistics.slivers_wanted);
   parameters.min_dihedral = 0;
-  EXPECT_FALSE(MeshOf(parameters, cloud).statistics.slivers_are_asked_about);
+  EXPECT_FALSE(MeshOf(parameters, cloud).statistics.slivers_wanted);
   parameters.pump_weights = true;
-  EXPECT_TRUE(MeshOf(parameters, cloud).statistics.slivers_are_asked_about);
+  EXPECT_TRUE(MeshOf(parameters, cloud).statistics.slivers_wanted);
 }
 
 }  // namespace

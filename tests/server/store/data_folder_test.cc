@@ -3,10 +3,17 @@
 
 #include <unistd.h>
 
+#include <atomic>
 #include <filesystem>
+#include <functional>
+#include <memory>
 #include <string>
+#include <thread>
+#include <utility>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
+#include "absl/synchronization/notification.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "tests/server/store/store_support.h"
@@ -156,6 +163,97 @@ TEST_F(DataFolderTest, SetsAsideWhatNoSessionNamesAndLeavesWhatItDoesNotKnow) {
   EXPECT_THAT(sweep->unknown, ElementsAre(root_ + "/core", paths_.files() + "/notes.txt", paths_.lost() + "/letter"));
   EXPECT_THAT(*PosixFileSystem().List(paths_.files()),
               UnorderedElementsAre("aa.points", "aa.mesh-3", "cc.mesh-1", "cc.mesh-1.tmp", "notes.txt"));
+}
+
+TEST_F(DataFolderTest, KnowsTheDatabaseThatAMoveHasLeft) {
+  const auto folder = DataFolder::Open(root_, PosixFileSystem());
+  ASSERT_TRUE(folder.ok());
+  WriteFile(root_ + "/sessions.db.moved", "x");
+  const auto in_use = std::make_shared<FilesInUse>(PosixFileSystem());
+  const auto sweep = (*folder)->RemoveGarbage(
+      *in_use, OwnsNone, [] { return Census{.sessions = {}, .oldest_epoch = 1}; }, now_);
+  ASSERT_TRUE(sweep.ok()) << sweep.status();
+  EXPECT_THAT(sweep->unknown, IsEmpty());
+  EXPECT_TRUE(std::filesystem::exists(root_ + "/sessions.db.moved"));
+}
+
+// A folder with leftovers of the same names whenever it is listed; says when it is, and refuses to change.
+class Leftovers final : public FileSystem {
+ public:
+  Leftovers(std::vector<std::string> names, std::function<void()> on_list)
+      : names_(std::move(names)), on_list_(std::move(on_list)) {}
+
+  absl::StatusOr<std::unique_ptr<File>> Open(const std::string& path, Mode /*mode*/) override {
+    return absl::UnimplementedError(path);
+  }
+  absl::Status Rename(const std::string& /*from*/, const std::string& /*to*/) override {
+    ++renames_;
+    return absl::OkStatus();
+  }
+  absl::Status Remove(const std::string& path) override { return absl::UnimplementedError(path); }
+  absl::Status Link(const std::string& from, const std::string& /*to*/) override {
+    return absl::UnimplementedError(from);
+  }
+  absl::StatusOr<std::vector<std::string>> List(const std::string& folder) override {
+    if (!folder.ends_with("/files")) {
+      return std::vector<std::string>();
+    }
+    on_list_();
+    return names_;
+  }
+  absl::Status CreateFolder(const std::string& /*folder*/) override { return absl::OkStatus(); }
+  absl::Status SynchronizeFolder(const std::string& /*folder*/) override { return absl::OkStatus(); }
+  absl::StatusOr<std::unique_ptr<FileLock>> LockFolder(const std::string& folder) override {
+    return absl::UnimplementedError(folder);
+  }
+  absl::StatusOr<std::unique_ptr<FileLock>> Lock(const std::string& path) override {
+    return absl::UnimplementedError(path);
+  }
+
+  int renames() const { return renames_; }
+
+ private:
+  const std::vector<std::string> names_;
+  const std::function<void()> on_list_;
+  int renames_ = 0;
+};
+
+// A writer takes the names of leftovers while a sweep looks at them; the rows are read once it has taken all.
+TEST_F(DataFolderTest, LeavesFilesAloneThatAreTakenWhileItLooks) {
+  constexpr int kSweeps = 50;
+  constexpr int kFiles = 200;
+  std::vector<std::string> names;
+  for (int i = 0; i < kFiles; ++i) {
+    names.push_back(absl::StrCat("aa.mesh-", 1000 + i));
+  }
+  for (int i = 0; i < kSweeps; ++i) {
+    std::atomic<bool> is_listed = false;
+    Leftovers files(names, [&] { is_listed = true; });
+    const auto folder = DataFolder::OpenShared(root_, files);
+    ASSERT_TRUE(folder.ok()) << folder.status();
+    const auto in_use = std::make_shared<FilesInUse>(files);
+    std::vector<std::unique_ptr<FilesInUse::Use>> uses;
+    absl::Notification is_taken;
+    std::thread writer([&] {
+      while (!is_listed) {
+      }
+      for (const std::string& name : names) {
+        uses.push_back(in_use->Take(absl::StrCat(paths_.files(), "/", name), /*is_written=*/true));
+      }
+      is_taken.Notify();
+    });
+    const auto sweep = (*folder)->RemoveGarbage(
+        *in_use, OwnsNone,
+        [&] {
+          is_taken.WaitForNotification();
+          return Census{.sessions = {}, .oldest_epoch = 1};
+        },
+        now_);
+    writer.join();
+    uses.clear();
+    ASSERT_TRUE(sweep.ok()) << sweep.status();
+    ASSERT_EQ(files.renames(), 0) << "in sweep " << i;
+  }
 }
 
 // Between the look at the folder and the look at the rows a mesh is written, named and no longer read.

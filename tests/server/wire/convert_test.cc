@@ -465,7 +465,7 @@ TEST(MetadataToProto, SaysHowManyVerticesHaveMoved) {
 TEST(MetadataToProto, SaysWhatWasDoneAgainstSlivers) {
   core::Mesh mesh = MakeFakeMesh(core::MeshParameters(), std::vector<double>{0.25, 0.5, 0.75});
   // An angle of 0 before is no reason to say nothing.
-  mesh.statistics.slivers_are_asked_about = true;
+  mesh.statistics.slivers_wanted = true;
   EXPECT_TRUE(MetadataToProto(mesh, 1).statistics().has_slivers());
   mesh.statistics.slivers = 7;
   mesh.statistics.slivers_left = 1;

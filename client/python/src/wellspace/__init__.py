@@ -1,4 +1,4 @@
-"""Quality simplicial meshes of points: a client of wellspaced.
+"""Quality simplicial meshes of points, domains and surfaces: a client of wellspaced.
 
 >>> import numpy, wellspace
 >>> mesh = wellspace.mesh(numpy.random.rand(1000, 3), size=0.2)

@@ -203,13 +203,14 @@ class Mesh(MeshArrays):
     ) -> None:
         """Writes the mesh to a file; the extension says in which format.
 
-        ``.npz`` needs nothing else. ``.vtu``, ``.vtkhdf``, ``.vtk``, ``.xdmf``, ``.msh``, ``.mesh``, ``.su2``,
-        ``.inp``, ``.node``, ``.14`` and ``.2dm`` are written by the tool `wellspace`, on the path or named by
-        ``$WELLSPACE_TOOL_BINARY``: the bytes of ``wellspace convert``, with names of parts and regions.
+        ``.npz`` needs nothing else. ``.vtu``, ``.vtkhdf``, ``.hdf``, ``.vtk``, ``.xdmf``, ``.msh``, ``.mesh``,
+        ``.su2``, ``.inp``, ``.node``, ``.ele``, ``.14``, ``.grd``, ``.gr3`` and ``.2dm`` are written by the tool
+        `wellspace`, on the path or named by ``$WELLSPACE_TOOL_BINARY``: the bytes of ``wellspace convert``, with
+        names of parts and regions.
         Other formats, those without the tool, and all with `options`, are those of `meshio.write`, in 2-D and 3-D.
 
         With ``order=2`` elements are of second order (`to_order`): ``.npz``, which has the arrays of `SecondOrderMesh`,
-        and by the tool ``.vtu``, ``.vtkhdf``, ``.vtk``, ``.xdmf``, ``.msh``, ``.inp`` and ``.node``.
+        and by the tool ``.vtu``, ``.vtkhdf``, ``.vtk``, ``.xdmf``, ``.msh``, ``.inp``, ``.node`` and ``.ele``.
 
         With ``periodic``, the axes along which the mesh is periodic, the file has the pairs of `periodic_pairs`:
         ``.npz`` in the arrays ``periodic_x`` and so on, ``.msh`` by the tool in ``$Periodic``.

@@ -278,7 +278,7 @@ def helpful_threads(points: Floats, parameters: Mapping[str, Any]) -> int:
 
 @functools.cache
 def _criterion_names() -> dict[int, str]:
-    return _api.enum_names("Criterion")
+    return _api.enum_names("Criterion") | {0: "radius-edge"}  # the default
 
 
 def read(message: Any) -> dict[str, Any]:
@@ -288,7 +288,7 @@ def read(message: Any) -> dict[str, Any]:
         for name, field in fields.items():
             if part.HasField(field):
                 found[name] = getattr(part, field)
-    found["criterion"] = _criterion_names().get(message.criterion, "radius-edge")
+    found["criterion"] = _criterion_names().get(message.criterion, "unknown")
     for name in ("pump_weights", "keep_vertices", "max_vertices", "threads"):
         if getattr(message, name):
             found[name] = getattr(message, name)

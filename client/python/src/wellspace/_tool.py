@@ -18,7 +18,10 @@ _WRONG_FILE = 2  # the exit status for files that are not valid
 
 # The extensions of meshes that it writes, beside .npz.
 MESH_FORMATS = frozenset(
-    (".vtu", ".vtkhdf", ".vtk", ".xdmf", ".msh", ".mesh", ".su2", ".inp", ".node", ".14", ".grd", ".2dm")
+    (
+        *(".vtu", ".vtkhdf", ".hdf", ".vtk", ".xdmf", ".msh", ".mesh", ".su2", ".inp", ".node", ".ele"),
+        *(".14", ".grd", ".gr3", ".2dm"),
+    )
 )
 
 
