@@ -84,9 +84,8 @@ class SessionMeshes {
   enum class Part { kEarlier, kAll };
   // The bytes that GiveUp would free.
   uint64_t SpareBytes(Part part) const;
-  // Gives up values that no caller uses: the earlier mesh, unless it is a file, and its locator; of kAll also locator and
-  // cuts of the last mesh, and all differences.
-  // locator, cuts and all differences, too.
+  // Gives up values that no caller uses: the earlier mesh, unless it is a file, and its locator; of kAll also the
+  // locator and the cuts of the last mesh, and all differences.
   [[nodiscard]] Dropped GiveUp(Part part);
   // The memory of the earlier mesh is other work's, if that wants it.
   void YieldEarlier();
