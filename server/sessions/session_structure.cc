@@ -132,7 +132,8 @@ absl::StatusOr<std::shared_ptr<const LocatedMesh>> Session::PrepareLocator(uint6
     }
     return work_.mesh;
   };
-  return locator_.Prepare(mesh, make);
+  absl::StatusOr<std::shared_ptr<const LocatedMesh>> located = locator_.Prepare(mesh, make);
+  return located.ok() ? std::move(located) : ErrorOfFile(located.status());
 }
 
 absl::StatusOr<std::shared_ptr<const MeshCut>> Session::PrepareCut(const std::shared_ptr<const MeshSnapshot>& mesh,
@@ -144,9 +145,10 @@ absl::StatusOr<std::shared_ptr<const MeshCut>> Session::PrepareCut(const std::sh
     return mesh;
   };
   const Lasts lasts = inputs().lasts;
-  return cuts_.Prepare(
+  absl::StatusOr<std::shared_ptr<const MeshCut>> cut = cuts_.Prepare(
       find, [&](const MeshSnapshot& found) { return CutIntoParts(found, options, lasts, job); }, IsCutWith(options),
       is_at_work);
+  return cut.ok() ? std::move(cut) : ErrorOfFile(cut.status());
 }
 
 bool Session::HasCut(const MeshSnapshot& mesh, const core::PartitionOptions& options) const {
