@@ -49,11 +49,15 @@ Backend::Backend(const ServiceOptions& options, const Authenticator& authenticat
           options_, memory_, drive.clock, *session_log_, drive.make_session_name,
           [this](const std::string& tenant, const std::string& name) { return other_owners_.Find(tenant, name); }),
       other_owners_(
-          session_log_->records(), [this](std::vector<StoredSession> taken) { return TakeInOfOthers(taken); },
+          session_log_->records(),
+          [this](const std::vector<StoredSession>& taken, OtherOwners::From from) {
+            return TakeInOfOthers(taken, from);
+          },
           [this](const std::string& name) {
             const std::shared_ptr<Session> session = sessions_.FindHere(name);
             return session != nullptr && !session->IsElsewhere();
-          }),
+          },
+          [this] { return GetRoomForWork(); }),
       idle_sessions_(sessions_, memory_, observability.work()),
       environment_{.options = options_,
                    .mesher = mesher_,
@@ -70,6 +74,7 @@ Backend::Backend(const ServiceOptions& options, const Authenticator& authenticat
                    .session_log = *session_log_,
                    .observability = observability,
                    .log = *log_},
+      work_offers_(environment_),
       background_(drive.run_by),
       blocking_(drive.run_by == RunBy::kCaller ? 0 : kBlockingThreads),
       jobs_({.workers = options_.workers,
@@ -80,6 +85,9 @@ Backend::Backend(const ServiceOptions& options, const Authenticator& authenticat
             memory_) {
   AddMetrics(observability.metrics());
   ScheduleExpiry();
+  if (session_log_->records().is_shared()) {
+    ScheduleOffers();
+  }
 }
 
 void Backend::AddMetrics(Metrics& metrics) {
@@ -100,6 +108,15 @@ void Backend::AddMetrics(Metrics& metrics) {
   };
   add_counters("small_jobs_", "Small jobs", &JobPool::Counters::small);
   add_counters("other_jobs_", "Jobs that are not small", &JobPool::Counters::others);
+  const auto add_counter = [&](const std::string& name, const std::string& help, auto read) {
+    metrics.AddCounter(name, help, [read] { return static_cast<double>(read()); });
+  };
+  add_counter("wellspace_operations_offered_total", "Operations in line that were offered to other servers.",
+              [this] { return work_offers_.offered(); });
+  add_counter("wellspace_operations_given_total", "Of these, those that another server has taken.",
+              [this] { return work_offers_.given(); });
+  add_counter("wellspace_operations_taken_total", "Operations that were taken from servers which had offered them.",
+              [this] { return taken_operations_.load(); });
   metrics.AddGauge("wellspace_sessions", "Sessions of all tenants.",
                    [this] { return static_cast<double>(sessions_.Count()); });
   metrics.AddGauge("wellspace_stored_bytes",
@@ -162,7 +179,12 @@ absl::Status Backend::TakeIn(const StoredSession& stored, std::vector<ResumedOpe
   return absl::OkStatus();
 }
 
-std::vector<std::string> Backend::TakeInOfOthers(const std::vector<StoredSession>& stored) {
+RoomForWork Backend::GetRoomForWork() const {
+  JobPool::Room room = jobs_.GetRoom();
+  return {.sessions = room.jobs, .full_tenants = std::move(room.full_tenants)};
+}
+
+std::vector<std::string> Backend::TakeInOfOthers(const std::vector<StoredSession>& stored, OtherOwners::From from) {
   std::vector<std::string> left;
   std::vector<ResumedOperation> resumed;
   for (const StoredSession& one : stored) {
@@ -175,8 +197,9 @@ std::vector<std::string> Backend::TakeInOfOthers(const std::vector<StoredSession
       left.push_back(one.state.name());
     }
   }
+  taken_operations_ += from == OtherOwners::From::kBusy ? resumed.size() : 0;
   log_->info(LogFields()
-                 .Add("event", "taken_over")
+                 .Add("event", from == OtherOwners::From::kBusy ? "work_taken" : "taken_over")
                  .Add("sessions", static_cast<uint64_t>(stored.size() - left.size()))
                  .Add("operations", static_cast<uint64_t>(resumed.size()))
                  .text());
@@ -242,6 +265,13 @@ void Backend::RemoveGarbage() {
     }
   });
   background_.PostAfter(kGarbageInterval, [this] { RemoveGarbage(); });
+}
+
+void Backend::ScheduleOffers() {
+  background_.PostAfter(WorkOffers::kBetweenLooks, [this] {
+    work_offers_.Look();
+    ScheduleOffers();
+  });
 }
 
 void Backend::ScheduleExpiry() {

@@ -2,6 +2,8 @@
 #ifndef WELLSPACE_SERVER_BACKEND_H_
 #define WELLSPACE_SERVER_BACKEND_H_
 
+#include <atomic>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -24,6 +26,7 @@
 #include "server/sessions/other_owners.h"
 #include "server/sessions/refinement.h"
 #include "server/sessions/session_registry.h"
+#include "server/sessions/work_offers.h"
 #include "server/store/session_log.h"
 #include "spdlog/logger.h"
 
@@ -67,6 +70,7 @@ class Backend {
 
  private:
   void ScheduleExpiry();
+  void ScheduleOffers();
   void RemoveExpired();
   // Writes down that sessions are no more which have expired when the disk had no room for it.
   void LogExpiries(const std::vector<SessionChange>& deletions);
@@ -75,7 +79,8 @@ class Backend {
   // Errors:     those of Session::ResumeOperation: it has not been taken in.
   absl::Status TakeIn(const StoredSession& stored, std::vector<ResumedOperation>& resumed);
   // As OtherOwners::TakeIn.
-  std::vector<std::string> TakeInOfOthers(const std::vector<StoredSession>& stored);
+  std::vector<std::string> TakeInOfOthers(const std::vector<StoredSession>& stored, OtherOwners::From from);
+  RoomForWork GetRoomForWork() const;
   void RemoveGarbage();
   void AddMetrics(Metrics& metrics);
 
@@ -94,7 +99,9 @@ class Backend {
   std::vector<SessionChange>
       unlogged_;  // deletions of sessions that have expired, still to be made; guarded by unlogged_mutex_
   const IdleSessions idle_sessions_;
+  std::atomic<uint64_t> taken_operations_ = 0;  // from servers that had offered them
   const CallEnvironment environment_;
+  WorkOffers work_offers_;
   // The background thread ends first. Each other ends before those above it, and before the parts that it uses.
   Background background_;
   BlockingThreads blocking_;

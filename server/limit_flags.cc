@@ -126,6 +126,9 @@ void DeclareLimits(CLI::App& app, ServiceOptions& service) {
   AddCount(app, "--small-workers", service.small_workers, 0, 1000,
            "Workers besides, which run small jobs alone; with 0 these wait as others do");
   AddCount(app, "--max-queued", service.max_queued_jobs, 0, 100'000, "Jobs that wait for a worker; more are refused");
+  AddCount(app, "--keep-queued", service.keep_queued, 0, 100'000,
+           "Refinements that wait for a worker here; what waits besides is offered to idle servers that share the "
+           "--store");
   AddCount(app, "--max-jobs-per-tenant", service.max_jobs_per_tenant, 1, 100'000,
            "Jobs of one tenant that run or wait; more are refused");
   app.add_option_function<std::string>(

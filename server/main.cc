@@ -185,7 +185,7 @@ LogFields StartOf(const Flags& flags, const Server& server) {
   fields.Add("tokens", security.token_file.empty() ? "no" : "yes");
   fields.Add("workers", count(service.workers)).Add("small_workers", count(service.small_workers));
   fields.Add("max_threads", count(service.max_threads));
-  fields.Add("max_queued", count(service.max_queued_jobs));
+  fields.Add("max_queued", count(service.max_queued_jobs)).Add("keep_queued", count(service.keep_queued));
   fields.Add("max_jobs_per_tenant", count(service.max_jobs_per_tenant));
   fields.Add("max_memory_bytes", service.max_memory_bytes);
   fields.Add("max_points", service.max_points).Add("max_vertices", service.max_vertices);

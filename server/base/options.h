@@ -37,6 +37,7 @@ struct ServiceOptions {
   int small_workers = 0;          // that run small jobs besides; 0: these wait as others do
   int max_queued_jobs = 64;       // that wait for a worker
   int max_jobs_per_tenant = 32;   // that run or wait, at least 1
+  int keep_queued = 0;            // refinements that wait here and are not offered to servers that share the store
   int max_threads = 1;            // of one job, at least 1
   uint64_t max_memory_bytes = 0;  // resident memory of the process, at least kMinMemoryBytes; 0: no limit
 

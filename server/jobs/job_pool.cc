@@ -130,6 +130,21 @@ void JobPool::Cancel(const std::shared_ptr<Job>& job) {
   }
 }
 
+JobPool::Room JobPool::GetRoom() const {
+  std::lock_guard lock(mutex_);
+  Room room;
+  if (stopping_ || !alone_.empty()) {
+    return room;
+  }
+  room.jobs = std::max(0, limits_.workers - running_ - static_cast<int>(queue_.size()));
+  for (const auto& [tenant, share] : jobs_of_) {
+    if (std::max(share.small, share.others) >= limits_.max_per_tenant) {
+      room.full_tenants.push_back(tenant);
+    }
+  }
+  return room;
+}
+
 JobPool::Load JobPool::GetLoad() const {
   std::lock_guard lock(mutex_);
   return Load{.running = running_ + running_small_, .queued = static_cast<int>(queue_.size())};

@@ -14,6 +14,7 @@
 #include <set>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -94,6 +95,13 @@ class JobPool {
   // With RunBy::kCaller: runs the job that a worker would run now. False: there is none. A job may call it, and runs
   // beside the other then.
   bool RunNext();
+
+  // Jobs that would begin at once.
+  struct Room {
+    int jobs = 0;
+    std::vector<std::string> full_tenants;  // that have as many jobs of a kind as they may have
+  };
+  Room GetRoom() const;
 
   Load GetLoad() const;
   Counters GetCounters() const;

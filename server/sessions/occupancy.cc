@@ -20,7 +20,7 @@ absl::Status NoSuchSession(const std::string& session) {
 
 absl::Status CheckOpen(const Occupancy& occupancy, const std::string& session) {
   if (occupancy.is_elsewhere) {
-    return Elsewhere(session);
+    return Elsewhere(session, occupancy.owner_address);
   }
   return occupancy.is_closed
              ? MakeError(v1::ERROR_REASON_SESSION_NOT_FOUND,

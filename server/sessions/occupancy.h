@@ -24,7 +24,9 @@ struct Occupancy {
   Lease lease;
   Busy busy = Busy::kNo;
   bool is_closed = false;
-  bool is_elsewhere = false;  // another server has taken the session over; it is closed here, too
+  bool is_elsewhere = false;    // another server has taken the session over; it is closed here, too
+  std::string owner_address{};  // where that one serves; empty: not known
+  bool is_offered = false;      // other servers may take it over now, or have
   bool is_uploading = false;
   int queries = 0;         // batches that run
   int structure_uses = 0;  // while there are any, the mesher is not given up for other work

@@ -71,7 +71,8 @@ void OtherOwners::LookAgain() {
         left_.push_back(name);
       }
     }
-    return TakeOrphans();
+    WELLSPACE_RETURN_IF_ERROR(TakeOrphans());
+    return TakeWork();
   };
   RunGuarded(look).IgnoreError();  // the next look is soon
   thread_->PostAfter(kBetweenLooks, [this] { LookAgain(); });
@@ -103,12 +104,25 @@ absl::Status OtherOwners::LookFor(const std::string& tenant, const std::string& 
 
 absl::Status OtherOwners::TakeOrphans() {
   WELLSPACE_ASSIGN_OR_RETURN(std::vector<StoredSession> taken, records_.TakeOrphans());
+  TakeAll(std::move(taken), From::kDead);
+  return absl::OkStatus();
+}
+
+absl::Status OtherOwners::TakeWork() {
+  const RoomForWork room = get_room_();
+  if (room.sessions > 0) {
+    WELLSPACE_ASSIGN_OR_RETURN(std::vector<StoredSession> taken, records_.TakeOffered(room));
+    TakeAll(std::move(taken), From::kBusy);
+  }
+  return absl::OkStatus();
+}
+
+void OtherOwners::TakeAll(std::vector<StoredSession> taken, From from) {
   if (!taken.empty()) {
-    for (std::string& name : take_in_(std::move(taken))) {
+    for (std::string& name : take_in_(std::move(taken), from)) {
       left_.push_back(std::move(name));
     }
   }
-  return absl::OkStatus();
 }
 
 // At a new epoch: what was under way when it left the registry is not to come in between.
@@ -122,7 +136,7 @@ absl::Status OtherOwners::TakeOne(const std::string& name) {
   }
   std::vector<StoredSession> one;
   one.push_back(*std::move(taken));
-  return take_in_(std::move(one)).empty() ? absl::OkStatus() : Unknown(name);
+  return take_in_(std::move(one), From::kDead).empty() ? absl::OkStatus() : Unknown(name);
 }
 
 }  // namespace wellspace::server

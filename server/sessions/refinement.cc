@@ -30,7 +30,7 @@ namespace {
 
 // Before the end of an operation is written down again for which the disk had no room.
 constexpr absl::Duration kEndRetryDelay = absl::Seconds(1);
-// Before an operation of an earlier process comes again that found the queue full.
+// Before an operation comes again that found the queue full, or the store away.
 constexpr absl::Duration kResumeRetryDelay = absl::Milliseconds(200);
 
 absl::StatusOr<core::Mesh> MeshFirst(const MesherFactory& create_mesher, const SessionInputs& inputs,
@@ -173,6 +173,18 @@ void EndWhenPossible(const CallEnvironment& environment, const std::shared_ptr<S
   }
 }
 
+void Resume(const CallEnvironment& environment, const ResumedOperation& resumed);
+
+// Of an operation that could not begin: where the store was away, others may still take it, or not.
+void TryAgainIfOffered(const CallEnvironment& environment, const std::shared_ptr<Session>& session,
+                       const std::shared_ptr<Operation>& operation) {
+  if (operation->IsQueued() && session->IsOffered() && !session->IsElsewhere()) {
+    environment.background.PostAfter(kResumeRetryDelay, [&environment, session, operation] {
+      Resume(environment, {session, operation});
+    });
+  }
+}
+
 void Run(const CallEnvironment& environment, const std::shared_ptr<Session>& session,
          const std::shared_ptr<Operation>& operation, Job& job) {
   const absl::Duration start = SinceBoot();
@@ -181,6 +193,7 @@ void Run(const CallEnvironment& environment, const std::shared_ptr<Session>& ses
   }
   std::optional<SessionWork> work = session->BeginWork(*operation);
   if (!work.has_value()) {
+    TryAgainIfOffered(environment, session, operation);
     return;
   }
   const SessionInputs inputs = session->inputs();
@@ -247,6 +260,9 @@ absl::StatusOr<std::shared_ptr<Job>> Submit(const CallEnvironment& environment, 
 
 // Has the work of an operation of an earlier process done, as soon as there is a place for it.
 void Resume(const CallEnvironment& environment, const ResumedOperation& resumed) {
+  if (resumed.session->IsElsewhere()) {
+    return;
+  }
   if (!Submit(environment, resumed.session, resumed.operation).ok()) {
     environment.background.PostAfter(kResumeRetryDelay, [&environment, resumed] { Resume(environment, resumed); });
   }

@@ -151,6 +151,7 @@ absl::Status Session::Make(SessionChange& change, absl::FunctionRef<void()> also
   absl::MutexLock lock(&mutex_);
   state_ = std::move(after);
   occupancy_.lease.SetTtl(TtlOf(*state_));
+  occupancy_.is_offered &= change.operations.empty() && !change.is_deletion;
   also();
   return absl::OkStatus();
 }
@@ -173,9 +174,12 @@ absl::Status Session::Commit(const SessionChange& change, Survives survives) {
   return Elsewhere(name());
 }
 
-void Session::NoteElsewhere() {
+void Session::NoteElsewhere(const std::string& address) {
   absl::MutexLock lock(&mutex_);
   occupancy_.is_elsewhere = true;
+  if (!address.empty()) {
+    occupancy_.owner_address = address;
+  }
   occupancy_.is_closed = true;
   account_.Close();
 }

@@ -65,7 +65,7 @@ struct PointsLeft {
 //   session_points.cc      uploads                           session_features.cc    features
 //   session_removal.cc     points that are taken out         session_operations.cc  operations
 //   session_sizes.cc       sizes at points                   session_structure.cc   the mesher that is built again,
-//                                                            vertices that are added
+//   session_offers.cc      operations for other servers                             vertices that are added
 //
 // States, and their changes: docs/design/sessions.md, "States".
 //
@@ -103,8 +103,8 @@ class Session {
   bool Renew();
   // Whether another server has taken the session over, so that this one has nothing to say of it.
   bool IsElsewhere() const;
-  // From now on it is.
-  void NoteElsewhere();
+  // From now on it is. `address`: that of the other server; empty: not known.
+  void NoteElsewhere(const std::string& address = "");
   // A session with a SessionUse, or with an operation under way, does not expire.
   bool IsExpired() const;
 
@@ -271,7 +271,8 @@ class Session {
   absl::StatusOr<std::shared_ptr<Operation>> StartOperation(core::MeshParameters parameters, bool restart,
                                                             uint64_t expected_revision, const SubmitWork& submit,
                                                             const AnswerTo<v1::Operation>& answer = nullptr);
-  // On the worker: the data to work on; nothing if the operation has ended before it could begin.
+  // On the worker: the data to work on; nothing if the operation has ended before it could begin. Nothing, too, if it
+  // is offered, and the offer could not be withdrawn: another server has taken it, or it is to be tried again.
   //
   // REQUIRES:   the operation has its job.
   std::optional<SessionWork> BeginWork(Operation& operation);
@@ -294,6 +295,30 @@ class Session {
   absl::StatusOr<v1::Operation> Tell(const Operation& operation) const;
   // The operations after number `after`, the oldest first, at most `count`.
   std::vector<std::shared_ptr<Operation>> ListOperations(uint64_t after, size_t count) const;
+
+  // ---- Operations that other servers may do: session_offers.cc ----
+
+  // An operation that waits for a worker, in whose work no process has died.
+  struct Waiting {
+    std::string operation;       // its name
+    absl::Time since;            // it was asked for
+    bool is_offered = false;     // with its session
+    bool has_structure = false;  // which another server would have to build again
+    bool is_read = false;        // a call reads the last mesh
+  };
+  std::optional<Waiting> GetWaiting() const;
+  // From now on other servers may take the session over, or may not any more. Nothing is done where that is so already,
+  // or no operation waits.
+  //
+  // Errors:     SESSION_ELSEWHERE: one has.
+  absl::Status SetOffer(bool stands);
+  // Whether other servers may take the session over, or have: this one is to ask before it tells of it.
+  bool IsOffered() const;
+  // Another server, at `address`, has taken the session over for its operation. Those who watch it are told. Returns
+  // the job that the caller is to cancel; null: there is none.
+  std::shared_ptr<Job> GiveAway(const std::string& address);
+  // `status`, or, if a file was found damaged which another server may have removed, SESSION_ELSEWHERE.
+  absl::Status ErrorOfFile(const absl::Status& status) const;
 
   // The inputs of the work that has made the session busy.
   SessionInputs inputs() const;

@@ -177,6 +177,12 @@ SessionChange OperationChange(const SessionState& state, const OperationRecord& 
   return change;
 }
 
+SessionChange OfferChange(const SessionState& state, bool stands) {
+  SessionChange change = EmptyChange(state);
+  change.offer = WorkOffer{.stands = stands, .tenant = state.record.tenant()};
+  return change;
+}
+
 SessionChange SuccessChange(const SessionState& state, const OperationRecord& operation,
                             const store::v1::MeshRecord& mesh) {
   SessionChange change = RecordChange(state);

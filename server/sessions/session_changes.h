@@ -83,6 +83,9 @@ SessionChange StartChange(const SessionState& state, const store::v1::OperationR
 // An operation that was started is from now on as `operation` says: it begins, is cancelled, fails or is parked.
 SessionChange OperationChange(const SessionState& state, const store::v1::OperationRecord& operation);
 
+// Other owners may take the session over for its operation, or may not any more.
+SessionChange OfferChange(const SessionState& state, bool stands);
+
 // An operation that has succeeded, as `operation` says, with the mesh of this record: all points are meshed.
 SessionChange SuccessChange(const SessionState& state, const store::v1::OperationRecord& operation,
                             const store::v1::MeshRecord& mesh);

@@ -36,6 +36,11 @@ std::shared_ptr<MeshSnapshot> SessionMeshes::last() const {
   return last_;
 }
 
+bool SessionMeshes::IsRead() const {
+  absl::MutexLock lock(&mutex_);
+  return last_.use_count() > 1;
+}
+
 absl::StatusOr<std::shared_ptr<const MeshSnapshot>> SessionMeshes::Kept(uint64_t revision) const {
   WELLSPACE_RETURN_IF_ERROR(options_.check());
   absl::MutexLock lock(&mutex_);

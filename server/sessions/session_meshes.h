@@ -48,6 +48,8 @@ class SessionMeshes {
 
   // The last mesh; null before the first.
   std::shared_ptr<MeshSnapshot> last() const;
+  // Whether a call has it, too.
+  bool IsRead() const;
   // The mesh of `revision`: the last one, or the one before it that was downloaded, or located points in, last. That is
   // kept while memory allows it.
   //

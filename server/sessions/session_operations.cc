@@ -130,8 +130,12 @@ std::optional<SessionWork> Session::BeginWork(Operation& operation) {
     const auto record = std::make_shared<const store::v1::OperationRecord>(operation.RecordOfStart(clock_.wall()));
     // Should the process die in this work, the next one is to know. Without that it would only try once more.
     SessionChange change = OperationChange(*state(), *record);
-    (void)Make(
-        change, [] {}, NoAnswer, Survives::kProcessDeath);
+    const bool was_offered = IsOffered();
+    const absl::Status made = Make(
+        change, [] {}, NoAnswer, was_offered ? Survives::kPowerLoss : Survives::kProcessDeath);
+    if (was_offered && !made.ok()) {
+      return std::nullopt;
+    }
     (void)operation.Apply(record);
   }
   absl::MutexLock lock(&mutex_);
@@ -255,7 +259,9 @@ absl::StatusOr<std::shared_ptr<Job>> Session::Cancel(Operation& operation) {
 absl::StatusOr<v1::Operation> Session::Tell(const Operation& operation) const {
   v1::Operation told = operation.Describe();
   // After that: an operation fails here only after its session is known to be elsewhere.
-  return IsElsewhere() ? Elsewhere(name()) : absl::StatusOr<v1::Operation>(std::move(told));
+  absl::MutexLock lock(&mutex_);
+  return occupancy_.is_elsewhere ? Elsewhere(name(), occupancy_.owner_address)
+                                 : absl::StatusOr<v1::Operation>(std::move(told));
 }
 
 absl::StatusOr<std::shared_ptr<Operation>> Session::FindOperation(const std::string& operation_name) const {

@@ -127,7 +127,7 @@ std::shared_ptr<Session> SessionRegistry::FindHere(const std::string& name) cons
 absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Find(const std::string& tenant, const std::string& name) {
   WELLSPACE_RETURN_IF_ERROR(log_.records().CheckOwnership());
   std::shared_ptr<Session> session = FindHere(name);
-  if (find_elsewhere_ != nullptr && (session == nullptr || session->IsElsewhere())) {
+  if (find_elsewhere_ != nullptr && (session == nullptr || session->IsElsewhere() || session->IsOffered())) {
     WELLSPACE_RETURN_IF_ERROR(find_elsewhere_(tenant, name));
     session = FindHere(name);
   }
@@ -152,11 +152,15 @@ std::vector<std::shared_ptr<Session>> SessionRegistry::List(const std::string& t
   std::vector<std::shared_ptr<Session>> listed;
   for (const std::shared_ptr<Session>& session : sessions) {
     if (listed.size() < count && HasLabels(*session->state(), labels) && !session->IsExpired() &&
-        !session->IsElsewhere()) {
+        !session->IsElsewhere() && !IsTaken(*session)) {
       listed.push_back(session);
     }
   }
   return listed;
+}
+
+bool SessionRegistry::IsTaken(const Session& session) const {
+  return find_elsewhere_ != nullptr && session.IsOffered() && !find_elsewhere_(session.tenant(), session.name()).ok();
 }
 
 std::vector<std::shared_ptr<Session>> SessionRegistry::All() const {
@@ -171,9 +175,11 @@ std::vector<std::shared_ptr<Session>> SessionRegistry::All() const {
 
 bool SessionRegistry::Remove(const Session& session) {
   std::lock_guard lock(mutex_);
-  if (by_name_.erase(session.name()) == 0) {
+  const auto found = by_name_.find(session.name());
+  if (found == by_name_.end() || found->second.get() != &session) {
     return false;
   }
+  by_name_.erase(found);
   tenants_[session.tenant()].sessions.erase(session.create_time());
   DropIfEmpty(session.tenant());
   return true;

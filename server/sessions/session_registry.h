@@ -39,8 +39,8 @@ std::string UnguessableSessionName();
 //             used again, and cannot be guessed.
 class SessionRegistry {
  public:
-  // Asked, without a lock, for a session that is not here. OK: it has been taken in meanwhile (Restore). Errors: those
-  // of Find.
+  // Asked, without a lock, for a session that is not here, or may be taken over by another process. OK: it is here; it
+  // may have been taken in meanwhile (Restore). Errors: those of Find.
   using FindElsewhere = std::function<absl::Status(const std::string& tenant, const std::string& name)>;
 
   // REQUIRES:   `options`, `memory` and `log` outlive this and all sessions.
@@ -78,7 +78,7 @@ class SessionRegistry {
   // All sessions, of all tenants, in no order.
   std::vector<std::shared_ptr<Session>> All() const;
 
-  // Takes `session` out. False when it is not there any more.
+  // Takes `session` out. False when it is not there any more, or another of its name.
   bool Remove(const Session& session);
 
   // How many there are, of all tenants.
@@ -106,6 +106,9 @@ class SessionRegistry {
   //
   // Errors:     QUOTA_EXCEEDED, TOO_MANY_SESSIONS.
   absl::Status TakePlace(const std::string& tenant, std::shared_ptr<TenantPoints>* points, absl::Time* create_time);
+
+  // Whether another process has taken a session over that is offered to it, or that is not known now.
+  bool IsTaken(const Session& session) const;
 
   // The following want mutex_ to be held.
   void Publish(const std::shared_ptr<Session>& session);

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "absl/time/clock.h"
 #include "core/base/status_macros.h"
 #include "server/store/postgres_rows.h"
@@ -90,7 +91,8 @@ void TakeFromTheDead(pqxx::dbtransaction& transaction, int64_t owner, uint64_t e
   for (const pqxx::row& row :
        transaction.exec_params(absl::StrCat("SELECT id", kDeadOwners, " ORDER BY id FOR UPDATE"), owner, is_steady)) {
     const auto id = row[0].as<int64_t>();
-    transaction.exec_params0("UPDATE wellspace.sessions SET owner = $1, epoch = $2 WHERE owner = $3", owner, epoch, id);
+    transaction.exec_params0("UPDATE wellspace.sessions SET owner = $1, epoch = $2, offered_at = NULL WHERE owner = $3",
+                             owner, epoch, id);
     transaction.exec_params0("DELETE FROM wellspace.owners WHERE id = $1", id);
   }
 }
@@ -219,6 +221,46 @@ absl::StatusOr<std::vector<StoredSession>> PostgresRecords::TakeOrphans() {
     return absl::OkStatus();
   })));
   return taken;
+}
+
+absl::StatusOr<std::vector<StoredSession>> PostgresRecords::TakeOffered(const RoomForWork& room) {
+  std::vector<StoredSession> taken;
+  WELLSPACE_RETURN_IF_ERROR(health_->Check());
+  const std::string full = sql::ArrayOf(room.full_tenants);
+  bool has_offered = false;
+  WELLSPACE_RETURN_IF_ERROR(owning_.Read([&](pqxx::dbtransaction& transaction) {
+    has_offered = transaction.exec_prepared1(sql::kHasOffered, lease_.owner(), full)[0].as<bool>();
+    return absl::OkStatus();
+  }));
+  if (!has_offered) {
+    return taken;
+  }
+  WELLSPACE_RETURN_IF_ERROR(NoteFailure(reading_.Transact([&](pqxx::dbtransaction& transaction) -> absl::Status {
+    taken.clear();
+    std::vector<int64_t> ids;
+    for (const pqxx::row& row :
+         transaction.exec_prepared(sql::kTakeOffered, lease_.owner(), full, static_cast<int64_t>(room.sessions))) {
+      ids.push_back(row[0].as<int64_t>());
+    }
+    if (!ids.empty()) {
+      WELLSPACE_ASSIGN_OR_RETURN(taken,
+                                 LoadSessions(transaction, absl::StrCat("id IN (", absl::StrJoin(ids, ","), ")")));
+    }
+    return absl::OkStatus();
+  })));
+  return taken;
+}
+
+absl::StatusOr<std::vector<std::string>> PostgresRecords::ListOffered() {
+  std::vector<std::string> names;
+  WELLSPACE_RETURN_IF_ERROR(owning_.Read([&](pqxx::dbtransaction& transaction) {
+    names.clear();
+    for (const pqxx::row& row : transaction.exec_prepared(sql::kListOffered, lease_.owner())) {
+      names.push_back(row[0].as<std::string>());
+    }
+    return absl::OkStatus();
+  }));
+  return names;
 }
 
 absl::StatusOr<std::optional<SessionOwner>> PostgresRecords::FindOwner(const std::string& session) {

@@ -56,6 +56,8 @@ class PostgresRecords final : public Records {
   absl::Status CheckOwnership() const override { return lease_.Check(); }
   absl::StatusOr<std::optional<SessionOwner>> FindOwner(const std::string& session) override;
   absl::StatusOr<std::vector<StoredSession>> TakeOrphans() override;
+  absl::StatusOr<std::vector<StoredSession>> TakeOffered(const RoomForWork& room) override;
+  absl::StatusOr<std::vector<std::string>> ListOffered() override;
 
  private:
   PostgresRecords(const PostgresOptions& options, std::shared_ptr<StoreHealth> health);

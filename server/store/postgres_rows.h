@@ -6,10 +6,13 @@
 #include <pqxx/pqxx>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "core/base/status_macros.h"
 #include "server/store/postgres_schema.h"
 #include "server/store/record_keys.h"
@@ -20,6 +23,16 @@
 namespace wellspace::server::sql {
 
 inline pqxx::binarystring Blob(std::string_view bytes) { return {bytes.data(), bytes.size()}; }
+
+// An array of bytea, as a parameter of a statement.
+inline std::string ArrayOf(const std::vector<std::string>& blobs) {
+  return absl::StrCat("{",
+                      absl::StrJoin(blobs, ",",
+                                    [](std::string* out, const std::string& blob) {
+                                      absl::StrAppend(out, "\"\\\\x", absl::BytesToHexString(blob), "\"");
+                                    }),
+                      "}");
+}
 
 inline int64_t Checksum(const std::string& key, std::string_view record) {
   return static_cast<int64_t>(ChecksumOf(key, record));
@@ -90,6 +103,10 @@ class PostgresRows final : public RecordRows {
 
   absl::Status UpdateSession(const std::string& session, const Row& row, const std::string& record) override {
     return Run(kUpdateSession, *row.id, Blob(record), Checksum(KeyOf(session), record));
+  }
+
+  absl::Status SetOffer(int64_t session, const WorkOffer& offer) override {
+    return offer.stands ? Run(kOfferSession, session, Blob(offer.tenant)) : Run(kWithdrawSession, session);
   }
 
   absl::Status DeleteSession(int64_t id) override { return Run(kDeleteSession, id); }

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <string>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 
@@ -26,11 +27,14 @@ constexpr std::array kPostgresMigrations = {
     // given back.
     "CREATE TABLE wellspace.owners(id bigint GENERATED ALWAYS AS IDENTITY PRIMARY KEY, name text NOT NULL UNIQUE,"
     "                              epoch bigint NOT NULL, address text, lease_until timestamptz NOT NULL);"
-    // No session is of an owner that there is not: a change that would make one is refused.
+    // No session is of an owner that there is not: a change that would make one is refused. offered_at: since when its
+    // owner lets others have it; null: it does not. offered_of: its tenant then.
     "CREATE TABLE wellspace.sessions(id bigint GENERATED ALWAYS AS IDENTITY PRIMARY KEY, name text NOT NULL UNIQUE,"
     "                                owner bigint NOT NULL REFERENCES wellspace.owners, epoch bigint NOT NULL,"
-    "                                state bytea NOT NULL, crc32c bigint NOT NULL);"
+    "                                state bytea NOT NULL, crc32c bigint NOT NULL, offered_at timestamptz,"
+    "                                offered_of bytea);"
     "CREATE INDEX ON wellspace.sessions(owner);"
+    "CREATE INDEX ON wellspace.sessions(offered_at) WHERE offered_at IS NOT NULL;"
     "CREATE TABLE wellspace.steps(session bigint NOT NULL REFERENCES wellspace.sessions ON DELETE CASCADE,"
     "                             number bigint NOT NULL, kind bigint NOT NULL, record bytea NOT NULL,"
     "                             crc32c bigint NOT NULL, PRIMARY KEY(session, number));"
@@ -44,6 +48,64 @@ constexpr std::array kPostgresMigrations = {
     "                               time bigint NOT NULL, crc32c bigint NOT NULL, PRIMARY KEY(tenant, request_id));",
 };
 constexpr int kVersion = kFirstVersion + static_cast<int>(kPostgresMigrations.size()) - 1;
+
+constexpr std::pair<const char*, const char*> kStatements[] = {
+    // Others that would take the session over, or change it, wait for the end of the transaction.
+    {sql::kFindSession, "SELECT id, epoch FROM wellspace.sessions WHERE name = $1 FOR UPDATE"},
+    {sql::kInsertSession,
+     "INSERT INTO wellspace.sessions(name, owner, epoch, state, crc32c) VALUES($1, $2, $3, $4, $5) RETURNING id"},
+    {sql::kUpdateSession, "UPDATE wellspace.sessions SET state = $2, crc32c = $3 WHERE id = $1"},
+    {sql::kDeleteSession, "DELETE FROM wellspace.sessions WHERE id = $1"},
+    {sql::kTakeSession,
+     "UPDATE wellspace.sessions SET owner = $2, epoch = nextval('wellspace.epochs'), offered_at = NULL"
+     " WHERE name = $1 RETURNING id, name, epoch, state, crc32c"},
+    {sql::kOfferSession, "UPDATE wellspace.sessions SET offered_at = clock_timestamp(), offered_of = $2 WHERE id = $1"},
+    {sql::kWithdrawSession, "UPDATE wellspace.sessions SET offered_at = NULL WHERE id = $1"},
+    {sql::kHasOffered,
+     "SELECT EXISTS(SELECT FROM wellspace.sessions WHERE offered_at IS NOT NULL AND owner <> $1"
+     "              AND NOT offered_of = ANY($2::bytea[]))"},
+    // Rows that another has locked, to take the session or to change it, are left to that one: nothing here waits.
+    {sql::kTakeOffered,
+     "WITH offered AS MATERIALIZED"
+     " (SELECT id FROM wellspace.sessions WHERE offered_at IS NOT NULL AND owner <> $1"
+     "  AND NOT offered_of = ANY($2::bytea[]) ORDER BY offered_at LIMIT $3 FOR UPDATE SKIP LOCKED)"
+     " UPDATE wellspace.sessions SET owner = $1, epoch = nextval('wellspace.epochs'), offered_at = NULL"
+     " FROM offered WHERE sessions.id = offered.id RETURNING sessions.id"},
+    {sql::kListOffered, "SELECT name FROM wellspace.sessions WHERE offered_at IS NOT NULL AND owner = $1"},
+    {sql::kReadSession, "SELECT id, name, epoch, state, crc32c FROM wellspace.sessions WHERE name = $1"},
+    {sql::kNextStep, "SELECT coalesce(max(number) + 1, 0) FROM wellspace.steps WHERE session = $1"},
+    {sql::kInsertStep, "INSERT INTO wellspace.steps(session, number, kind, record, crc32c) VALUES($1, $2, $3, $4, $5)"},
+    {sql::kReadFeatures,
+     "SELECT session, number, kind, record, crc32c FROM wellspace.steps"
+     " WHERE session = (SELECT id FROM wellspace.sessions WHERE name = $1) AND kind = $2 ORDER BY number"},
+    // An operation that has begun, or ended, is no work for others any more.
+    {sql::kPutOperation,
+     "WITH withdrawn AS"
+     " (UPDATE wellspace.sessions SET offered_at = NULL WHERE id = $1 AND offered_at IS NOT NULL)"
+     " INSERT INTO wellspace.operations(session, number, record, crc32c) VALUES($1, $2, $3, $4)"
+     " ON CONFLICT(session, number) DO UPDATE SET record = excluded.record, crc32c = excluded.crc32c"},
+    {sql::kDropOperation, "DELETE FROM wellspace.operations WHERE session = $1 AND number = $2"},
+    {sql::kInsertSizes,
+     "INSERT INTO wellspace.sizes(session, number, part, record, crc32c) VALUES($1, $2, $3, $4, $5)"},
+    {sql::kReadSizes,
+     "SELECT session, number, part, record, crc32c FROM wellspace.sizes"
+     " WHERE session = (SELECT id FROM wellspace.sessions WHERE name = $1) ORDER BY number, part"},
+    {sql::kDropSizes, "DELETE FROM wellspace.sizes WHERE session = $1 AND number = $2"},
+    {sql::kInsertAnswer,
+     "INSERT INTO wellspace.answers(tenant, request_id, record, time, crc32c) VALUES($1, $2, $3, $4, $5)"
+     " ON CONFLICT DO NOTHING"},
+    {sql::kReadAnswer,
+     "SELECT tenant, request_id, record, crc32c FROM wellspace.answers WHERE tenant = $1 AND request_id = $2"},
+    {sql::kDropAnswer, "DELETE FROM wellspace.answers WHERE tenant = $1 AND request_id = $2"},
+    {sql::kRenewLease,
+     "UPDATE wellspace.owners SET lease_until = clock_timestamp() + make_interval(secs => $2) WHERE id = $1"},
+    {sql::kGiveBack, "UPDATE wellspace.owners SET lease_until = '-infinity' WHERE id = $1"},
+    // Whether it lives is asked by the clock that has given the lease.
+    {sql::kFindOwner,
+     "SELECT sessions.id, sessions.name, sessions.epoch, state, crc32c, owner, coalesce(address, ''),"
+     "       lease_until > clock_timestamp()"
+     " FROM wellspace.sessions JOIN wellspace.owners ON owners.id = owner WHERE sessions.name = $1"},
+};
 
 absl::Status Migrate(pqxx::dbtransaction& transaction) {
   transaction.exec(kLockSchema);
@@ -67,49 +129,7 @@ absl::Status Migrate(pqxx::dbtransaction& transaction) {
 }  // namespace
 
 void PreparePostgres(pqxx::connection& connection) {
-  const std::pair<const char*, const char*> statements[] = {
-      // Others that would take the session over, or change it, wait for the end of the transaction.
-      {sql::kFindSession, "SELECT id, epoch FROM wellspace.sessions WHERE name = $1 FOR UPDATE"},
-      {sql::kInsertSession,
-       "INSERT INTO wellspace.sessions(name, owner, epoch, state, crc32c) VALUES($1, $2, $3, $4, $5) RETURNING id"},
-      {sql::kUpdateSession, "UPDATE wellspace.sessions SET state = $2, crc32c = $3 WHERE id = $1"},
-      {sql::kDeleteSession, "DELETE FROM wellspace.sessions WHERE id = $1"},
-      {sql::kTakeSession,
-       "UPDATE wellspace.sessions SET owner = $2, epoch = nextval('wellspace.epochs') WHERE name = $1"
-       " RETURNING id, name, epoch, state, crc32c"},
-      {sql::kReadSession, "SELECT id, name, epoch, state, crc32c FROM wellspace.sessions WHERE name = $1"},
-      {sql::kNextStep, "SELECT coalesce(max(number) + 1, 0) FROM wellspace.steps WHERE session = $1"},
-      {sql::kInsertStep,
-       "INSERT INTO wellspace.steps(session, number, kind, record, crc32c) VALUES($1, $2, $3, $4, $5)"},
-      {sql::kReadFeatures,
-       "SELECT session, number, kind, record, crc32c FROM wellspace.steps"
-       " WHERE session = (SELECT id FROM wellspace.sessions WHERE name = $1) AND kind = $2 ORDER BY number"},
-      {sql::kPutOperation,
-       "INSERT INTO wellspace.operations(session, number, record, crc32c) VALUES($1, $2, $3, $4)"
-       " ON CONFLICT(session, number) DO UPDATE SET record = excluded.record, crc32c = excluded.crc32c"},
-      {sql::kDropOperation, "DELETE FROM wellspace.operations WHERE session = $1 AND number = $2"},
-      {sql::kInsertSizes,
-       "INSERT INTO wellspace.sizes(session, number, part, record, crc32c) VALUES($1, $2, $3, $4, $5)"},
-      {sql::kReadSizes,
-       "SELECT session, number, part, record, crc32c FROM wellspace.sizes"
-       " WHERE session = (SELECT id FROM wellspace.sessions WHERE name = $1) ORDER BY number, part"},
-      {sql::kDropSizes, "DELETE FROM wellspace.sizes WHERE session = $1 AND number = $2"},
-      {sql::kInsertAnswer,
-       "INSERT INTO wellspace.answers(tenant, request_id, record, time, crc32c) VALUES($1, $2, $3, $4, $5)"
-       " ON CONFLICT DO NOTHING"},
-      {sql::kReadAnswer,
-       "SELECT tenant, request_id, record, crc32c FROM wellspace.answers WHERE tenant = $1 AND request_id = $2"},
-      {sql::kDropAnswer, "DELETE FROM wellspace.answers WHERE tenant = $1 AND request_id = $2"},
-      {sql::kRenewLease,
-       "UPDATE wellspace.owners SET lease_until = clock_timestamp() + make_interval(secs => $2) WHERE id = $1"},
-      {sql::kGiveBack, "UPDATE wellspace.owners SET lease_until = '-infinity' WHERE id = $1"},
-      // Whether it lives is asked by the clock that has given the lease.
-      {sql::kFindOwner,
-       "SELECT sessions.id, sessions.name, sessions.epoch, state, crc32c, owner, coalesce(address, ''),"
-       "       lease_until > clock_timestamp()"
-       " FROM wellspace.sessions JOIN wellspace.owners ON owners.id = owner WHERE sessions.name = $1"},
-  };
-  for (const auto& [name, statement] : statements) {
+  for (const auto& [name, statement] : kStatements) {
     connection.prepare(name, statement);
   }
 }

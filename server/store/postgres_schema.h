@@ -14,6 +14,11 @@ namespace sql {
 inline constexpr char kFindSession[] = "find_session";
 inline constexpr char kInsertSession[] = "insert_session";
 inline constexpr char kUpdateSession[] = "update_session";
+inline constexpr char kOfferSession[] = "offer_session";
+inline constexpr char kWithdrawSession[] = "withdraw_session";
+inline constexpr char kTakeOffered[] = "take_offered";
+inline constexpr char kHasOffered[] = "has_offered";
+inline constexpr char kListOffered[] = "list_offered";
 inline constexpr char kDeleteSession[] = "delete_session";
 inline constexpr char kTakeSession[] = "take_session";
 inline constexpr char kReadSession[] = "read_session";

@@ -69,6 +69,9 @@ absl::Status Write(RecordRows& rows, const SessionChange& change, const RecordRo
   }
   WELLSPACE_RETURN_IF_ERROR(WriteSteps(rows, *id, change.steps));
   WELLSPACE_RETURN_IF_ERROR(WriteOperations(rows, *id, change));
+  if (change.offer.has_value()) {
+    WELLSPACE_RETURN_IF_ERROR(rows.SetOffer(*id, *change.offer));
+  }
   return WriteSizes(rows, *id, change);
 }
 
@@ -78,7 +81,7 @@ absl::Status WriteChange(RecordRows& rows, const SessionChange& change) {
   WELLSPACE_ASSIGN_OR_RETURN(const RecordRows::Row row, rows.FindSession(change.session));
   const auto epoch = static_cast<int64_t>(change.epoch);
   const bool names_none = !change.state.has_value() && change.steps.empty() && change.operations.empty() &&
-                          change.dropped_operations.empty() && !change.sizes.has_value();
+                          change.dropped_operations.empty() && !change.sizes.has_value() && !change.offer.has_value();
   if (row.id.has_value() ? row.epoch != epoch
                          : row.epoch > epoch || !(change.is_creation || change.is_deletion || names_none)) {
     return OwnedElsewhere(change.session);

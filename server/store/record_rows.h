@@ -32,6 +32,8 @@ class RecordRows {
   virtual absl::StatusOr<int64_t> InsertSession(const std::string& session, int64_t epoch,
                                                 const std::string& record) = 0;
   virtual absl::Status UpdateSession(const std::string& session, const Row& row, const std::string& record) = 0;
+  // Where several processes own sessions at once.
+  virtual absl::Status SetOffer(int64_t /*session*/, const WorkOffer& /*offer*/) { return absl::OkStatus(); }
   // With all rows that are its.
   virtual absl::Status DeleteSession(int64_t id) = 0;
 
@@ -39,7 +41,7 @@ class RecordRows {
   virtual absl::StatusOr<int64_t> NextStep(int64_t session) = 0;
   virtual absl::Status InsertStep(int64_t session, int64_t number, int64_t kind, const std::string& record) = 0;
 
-  // New, or in the place of that of this number.
+  // New, or in the place of that of this number. The session is not offered any more.
   virtual absl::Status PutOperation(int64_t session, int64_t number, const std::string& record) = 0;
   virtual absl::Status DropOperation(int64_t session, int64_t number) = 0;
 

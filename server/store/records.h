@@ -30,6 +30,12 @@ struct StoredSizes {
   InTurn in_turn{};  // come behind `parts`; none of a set that was read
 };
 
+// An offer of a session to other processes that share the records, for its operation that waits for a worker.
+struct WorkOffer {
+  bool stands = false;   // else it is withdrawn
+  std::string tenant{};  // of the session
+};
+
 // The parts of one change of a session: all of them are made, or none.
 //
 // Epochs: a process that takes a session over from its owner gets its epoch, a number that none had before. A change
@@ -46,6 +52,7 @@ struct SessionChange {
   std::vector<uint64_t> dropped_operations{};            // their numbers
   std::optional<StoredSizes> sizes{};                    // a new set
   std::vector<uint64_t> dropped_sizes{};                 // the numbers of sets
+  std::optional<WorkOffer> offer{};                      // none: as before; but operations that change end an offer
   std::optional<store::v1::AnswerRecord> answer{};       // to the request that has made the change
   bool is_deletion = false;                              // of the session and all that it has
 };
@@ -75,6 +82,12 @@ struct StoredSessions {
 struct Census {
   std::vector<store::v1::SessionRecord> sessions;
   uint64_t oldest_epoch = 0;  // of the owners that there are: those at epochs before it are no more
+};
+
+// What a process can do of the work that others offer.
+struct RoomForWork {
+  int sessions = 0;                         // that have one operation each
+  std::vector<std::string> full_tenants{};  // whose work has no place here
 };
 
 // The owner of a session, where several processes share the records.
@@ -170,6 +183,15 @@ class Records {
 
   // Takes over all sessions of owners that are no more, at an epoch that is new. To be called again and again.
   virtual absl::StatusOr<std::vector<StoredSession>> TakeOrphans() { return std::vector<StoredSession>(); }
+
+  // Takes over sessions that their owners offer, those first that were offered first, each at an epoch that is new. No
+  // session is taken by two processes, or once its operation has begun. To be called again and again.
+  virtual absl::StatusOr<std::vector<StoredSession>> TakeOffered(const RoomForWork& /*room*/) {
+    return std::vector<StoredSession>();
+  }
+
+  // The names of the sessions that this process offers, and still owns.
+  virtual absl::StatusOr<std::vector<std::string>> ListOffered() { return std::vector<std::string>(); }
 };
 
 }  // namespace wellspace::server

@@ -76,8 +76,8 @@ void ReadOptions(std::string_view text) {
     return;
   }
   Require(options.workers >= 1 && options.max_threads >= 1 && options.max_queued_jobs >= 0 &&
-              options.max_jobs_per_tenant >= 1 && options.max_points >= 1 && options.max_vertices >= 1 &&
-              options.max_vertices <= core::kMaxVertices && options.max_sessions >= 1,
+              options.max_jobs_per_tenant >= 1 && options.keep_queued >= 0 && options.max_points >= 1 &&
+              options.max_vertices >= 1 && options.max_vertices <= core::kMaxVertices && options.max_sessions >= 1,
           "counts are in their ranges");
   Require(options.max_memory_bytes == 0 || options.max_memory_bytes >= server::kMinMemoryBytes, "memory suffices");
   Require(options.default_ttl >= absl::Seconds(1) && options.default_ttl <= options.max_ttl &&

@@ -34,8 +34,8 @@ std::optional<v1::WatchOperationResponse> WatchOperationCall::NextResponse() {
     End(absl::OkStatus());
     return std::nullopt;
   }
-  // First whether it has ended: after that there are no more events.
-  const bool has_ended = operation_->HasEnded();
+  // First whether it has ended, here or for this server: after that there are no more events.
+  const bool has_ended = operation_->HasEnded() || use_->session().IsElsewhere();
   v1::WatchOperationResponse response;
   if (std::optional<v1::ProgressEvent> event = operation_->EventAfter(after_)) {
     after_ = event->sequence();

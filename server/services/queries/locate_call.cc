@@ -103,6 +103,7 @@ void LocateCall::Locate(Job& job) {
     vertices = mesh->vertices;
     return allow_outside_ ? absl::OkStatus() : CheckInside(located, offset_);
   });
+  status = use_->session().ErrorOfFile(status);
   job.TakeMemory(std::numeric_limits<uint64_t>::max()).Release();
   use_->session().NoteIdle();
   std::lock_guard lock(mutex_);

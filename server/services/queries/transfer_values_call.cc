@@ -156,6 +156,7 @@ void TransferValuesCall::Work(NumberChunks& values, Job& job) {
   if (absl::IsInvalidArgument(status)) {
     status = Invalid(std::string(status.message()), "values");
   }
+  status = use_->session().ErrorOfFile(status);
   memory = job.TakeMemory(carried.values.size() * sizeof(double));
   job.TakeMemory(std::numeric_limits<uint64_t>::max()).Release();
   {

@@ -75,7 +75,7 @@ absl::Status DownloadMeshCall::Find() {
     WELLSPACE_RETURN_IF_ERROR(FindDeltas(*session));
   }
   WELLSPACE_RETURN_IF_ERROR(CheckRevision(deltas_.empty() ? mesh_->revision() : deltas_[0]->revision()));
-  WELLSPACE_RETURN_IF_ERROR(BeginPart());
+  WELLSPACE_RETURN_IF_ERROR(session->ErrorOfFile(BeginPart()));
   WELLSPACE_RETURN_IF_ERROR(CheckNextChunk());
   // The client has it, or differences that lead to it, from now on: those of later meshes from it are of use.
   session->meshes().deltas().NoteDownload(mesh_->revision());
@@ -132,6 +132,7 @@ void DownloadMeshCall::TakePartIn(Job& job) {
     }
     return absl::OkStatus();
   });
+  status = use_->session().ErrorOfFile(status);
   job.TakeMemory(std::numeric_limits<uint64_t>::max()).Release();
   use_->session().NoteIdle();
   std::lock_guard lock(mutex_);
@@ -221,7 +222,7 @@ std::optional<grpc::ByteBuffer> DownloadMeshCall::NextResponse() {
   }
   absl::StatusOr<grpc::ByteBuffer> response = MakeResponse();
   if (!response.ok()) {
-    End(std::move(response).status());
+    End(use_->session().ErrorOfFile(response.status()));
     return std::nullopt;
   }
   return *std::move(response);

@@ -140,8 +140,11 @@ absl::Status SetSizesCall::FindPoints(SizeStore& sizes) {
     const uint64_t coordinates = sizes.count() * session.dimension();
     WELLSPACE_RETURN_IF_ERROR(ReserveFor(sizes.bytes() + 2 * coordinates * sizeof(double)));
   }
-  WELLSPACE_ASSIGN_OR_RETURN(const core::HugeVector<double> points, mesh->LoadPoints(core::RunContext()));
-  sizes.SetPoints(points);
+  const absl::StatusOr<core::HugeVector<double>> points = mesh->LoadPoints(core::RunContext());
+  if (!points.ok()) {
+    return session.ErrorOfFile(points.status());
+  }
+  sizes.SetPoints(*points);
   return absl::OkStatus();
 }
 

@@ -237,6 +237,32 @@ TEST(JobPool, RefusesWhatIsAboveATenantsShareAndTakesThoseOfOthers) {
   EXPECT_NE(pool.Submit(WorkUntilCancelled, "a"), nullptr);
 }
 
+TEST(JobPool, KnowsForWhoseJobsThereIsRoom) {
+  MemoryBudget memory(0);
+  JobPool pool({.workers = 2, .max_queued = 10, .max_per_tenant = 2, .small_workers = 1, .run_by = RunBy::kCaller},
+               memory);
+  const auto submit = [&](const std::string& tenant, bool is_small, bool is_alone = false) {
+    return pool.Submit({.tenant = tenant, .is_small = is_small, .is_alone = is_alone, .work = [](Job&) {}}).value();
+  };
+  EXPECT_EQ(pool.GetRoom().jobs, 2);
+  EXPECT_TRUE(pool.GetRoom().full_tenants.empty());
+  submit("a", false);
+  submit("b", true);
+  EXPECT_EQ(pool.GetRoom().jobs, 0) << "a small job has the second worker";
+  submit("b", true);
+  EXPECT_EQ(pool.GetRoom().full_tenants, std::vector<std::string>{"b"});
+  submit("a", false);  // waits
+  EXPECT_EQ(pool.GetRoom().jobs, 0);
+  EXPECT_EQ(pool.GetRoom().full_tenants, (std::vector<std::string>{"a", "b"}));
+  while (pool.RunNext()) {
+  }
+  EXPECT_EQ(pool.GetRoom().jobs, 2);
+  const std::shared_ptr<Job> alone = submit("a", false, /*is_alone=*/true);
+  EXPECT_EQ(pool.GetRoom().jobs, 0) << "nothing begins beside it";
+  EXPECT_TRUE(pool.RunNext());
+  EXPECT_EQ(pool.GetRoom().jobs, 2);
+}
+
 TEST(JobPool, AFullQueueSaysHowFull) {
   Pool pool(1, 0);
   ASSERT_NE(pool.Submit(WorkUntilCancelled), nullptr);

@@ -22,6 +22,7 @@
 namespace wellspace::server {
 namespace {
 
+using ::testing::HasSubstr;
 using ::testing::IsSupersetOf;
 using ::testing::SizeIs;
 
@@ -121,6 +122,87 @@ class OwnershipTest : public ::testing::Test {
   const TestFolder root_;
   const std::shared_ptr<DataFolder> folder_ = DataFolder::Open(root_.path(), PosixFileSystem()).value();
 };
+
+TEST_F(OwnershipTest, AnOfferEndsWithTheBeginOfTheWork) {
+  Process process(folder_);
+  process.Create();
+  process.Upload({0, 0, 1, 0, 0, 1});
+  Session& session = process.session();
+  EXPECT_TRUE(session.SetOffer(true).ok());
+  EXPECT_FALSE(session.IsOffered()) << "no operation waits";
+  const std::shared_ptr<Operation> operation = process.Start();
+  EXPECT_FALSE(session.GetWaiting()->is_offered);
+  for (const bool stands : {true, true, false, false, true}) {
+    EXPECT_TRUE(session.SetOffer(stands).ok());
+    EXPECT_EQ(session.IsOffered(), stands);
+    EXPECT_EQ(session.GetWaiting()->is_offered, stands);
+  }
+  EXPECT_TRUE(session.Update({{{"a", "b"}}}, std::nullopt, 0).ok());
+  EXPECT_TRUE(session.IsOffered()) << "the operation waits still";
+  WorkResult result = process.Work(*operation);
+  EXPECT_FALSE(session.IsOffered());
+  EXPECT_FALSE(session.GetWaiting().has_value());
+  EXPECT_TRUE(session.SetOffer(true).ok());
+  EXPECT_FALSE(session.IsOffered()) << "what has begun is not offered";
+  EXPECT_TRUE(session.EndWork(*operation, result));
+  EXPECT_TRUE(result.status.ok());
+  const std::shared_ptr<Operation> cancelled = process.Start();
+  EXPECT_FALSE(session.GetWaiting()->is_read);
+  {
+    const std::shared_ptr<const MeshSnapshot> read = session.mesh();
+    EXPECT_TRUE(session.GetWaiting()->is_read);
+  }
+  EXPECT_TRUE(session.GetWaiting()->has_structure);
+  EXPECT_TRUE(session.SetOffer(true).ok());
+  EXPECT_TRUE(session.Cancel(*cancelled).ok());
+  EXPECT_FALSE(session.IsOffered());
+}
+
+TEST_F(OwnershipTest, WhatAnotherHasTakenDoesNotBegin) {
+  Process old(folder_);
+  old.Create();
+  old.Upload({0, 0, 1, 0, 0, 1});
+  const std::shared_ptr<Operation> waiting = old.Start();
+  int notices = 0;
+  waiting->Watch([&] { ++notices; });
+  const absl::Status damaged = absl::DataLossError("a file is gone");
+  EXPECT_EQ(old.session().ErrorOfFile(damaged), damaged);
+  ASSERT_TRUE(old.session().SetOffer(true).ok());
+  EXPECT_TRUE(absl::IsUnavailable(old.session().ErrorOfFile(damaged))) << "another may have removed it";
+  EXPECT_TRUE(absl::IsCancelled(old.session().ErrorOfFile(absl::CancelledError(""))));
+
+  Process owner(folder_);
+  ASSERT_NE(owner.resumed(), nullptr);
+  EXPECT_FALSE(owner.resumed()->IsSuspect());
+  EXPECT_FALSE(owner.session().IsOffered());
+  EXPECT_FALSE(old.session().BeginWork(*waiting).has_value());
+  EXPECT_TRUE(waiting->IsQueued());
+  EXPECT_TRUE(old.session().IsElsewhere());
+  EXPECT_EQ(notices, 0);
+  EXPECT_EQ(old.session().GiveAway("owner:7233"), nullptr) << "it has no job";
+  EXPECT_EQ(notices, 1);
+  EXPECT_THAT(std::string(old.session().Tell(*waiting).status().message()), HasSubstr("owner:7233"));
+  EXPECT_FALSE(old.session().GetWaiting().has_value());
+  old.Wait(absl::Hours(2));
+  EXPECT_TRUE(old.session().CloseIfExpired()) << "nothing keeps it here";
+  WorkResult result = owner.Work(*owner.resumed());
+  EXPECT_TRUE(owner.session().EndWork(*owner.resumed(), result));
+  EXPECT_TRUE(result.status.ok());
+}
+
+// The registry takes out the session that it is given, and not one of its name that has come back meanwhile.
+TEST_F(OwnershipTest, WhatHasComeBackStays) {
+  Process process(folder_);
+  const std::string name = process.Create().name();
+  const std::shared_ptr<Session> before = process.registry().FindHere(name);
+  const StoredSession taken = process.log().records().Take(name).value().value();
+  ASSERT_TRUE(process.registry().Restore(taken).ok());
+  EXPECT_FALSE(process.registry().Remove(*before));
+  const std::shared_ptr<Session> after = process.registry().FindHere(name);
+  ASSERT_NE(after, nullptr);
+  EXPECT_NE(after, before);
+  EXPECT_TRUE(process.registry().Remove(*after));
+}
 
 TEST_F(OwnershipTest, AnOwnerThatWasStoppedChangesNothingWhenItGoesOn) {
   Process old(folder_);

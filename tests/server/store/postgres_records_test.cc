@@ -4,8 +4,11 @@
 
 #include <atomic>
 #include <memory>
+#include <pqxx/pqxx>
+#include <set>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -23,9 +26,11 @@
 namespace wellspace::server {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
+using ::testing::UnorderedElementsAre;
 
 constexpr absl::Duration kShort = absl::Milliseconds(600);
 
@@ -214,6 +219,117 @@ TEST_F(PostgresRecordsTest, SessionsOfOneThatDiedAreTakenWhileOthersRun) {
 }
 
 // One that cannot renew its lease does not answer for its sessions from when others may have them.
+std::vector<std::string> NamesOf(const std::vector<StoredSession>& sessions) {
+  std::vector<std::string> names;
+  for (const StoredSession& session : sessions) {
+    names.push_back(session.state.name());
+  }
+  return names;
+}
+
+absl::Status Offer(Records& records, uint64_t number, bool stands = true) {
+  return records.Apply({.session = SessionName(number),
+                        .epoch = records.epoch(),
+                        .offer = WorkOffer{.stands = stands, .tenant = MakeState(number).tenant()}},
+                       Survives::kPowerLoss);
+}
+
+// A session that is offered is taken by one of the others, those first that were offered first, and never by its owner.
+TEST_F(PostgresRecordsTest, WhatIsOfferedIsTakenOnce) {
+  const auto first = Open("first").value();
+  const auto second = Open("second").value();
+  const auto third = Open("third").value();
+  for (const uint64_t number : {1, 2, 3}) {
+    ASSERT_TRUE(Create(*first, number).ok());
+  }
+  ASSERT_TRUE(Offer(*first, 2).ok());
+  ASSERT_TRUE(Offer(*first, 1).ok());
+  EXPECT_THAT(*first->TakeOffered({.sessions = 9}), IsEmpty());
+  EXPECT_THAT(*first->ListOffered(), UnorderedElementsAre(SessionName(1), SessionName(2)));
+  EXPECT_THAT(*second->ListOffered(), IsEmpty());
+  // Tenants are bytes, whatever they are.
+  EXPECT_THAT(*second->TakeOffered(
+                  {.sessions = 9, .full_tenants = {"\\\"}\xff", MakeState(1).tenant(), MakeState(2).tenant()}}),
+              IsEmpty());
+
+  const std::vector<StoredSession> taken = second->TakeOffered({.sessions = 1, .full_tenants = {"another"}}).value();
+  ASSERT_THAT(NamesOf(taken), ElementsAre(SessionName(2)));
+  EXPECT_GT(taken[0].epoch, second->epoch());
+  EXPECT_TRUE(second->FindOwner(SessionName(2))->value().is_self);
+  EXPECT_THAT(*first->ListOffered(), ElementsAre(SessionName(1)));
+  EXPECT_THAT(NamesOf(*third->TakeOffered({.sessions = 9})), ElementsAre(SessionName(1)));
+  EXPECT_THAT(*second->TakeOffered({.sessions = 9}), IsEmpty());
+  // Its owner of before can neither change it nor offer it.
+  EXPECT_TRUE(IsOwnedElsewhere(Update(*first, 2, first->epoch(), 3)));
+  EXPECT_TRUE(IsOwnedElsewhere(Offer(*first, 2)));
+  EXPECT_TRUE(IsOwnedElsewhere(Offer(*first, 2, /*stands=*/false)));
+  EXPECT_TRUE(IsOwnedElsewhere(Offer(*first, 4))) << "there is none";
+  EXPECT_TRUE(Update(*second, 2, taken[0].epoch, 3).ok());
+  EXPECT_TRUE(Update(*first, 3, first->epoch(), 3).ok());
+}
+
+// By a withdrawal, by an operation that changes, and with the owner's lease.
+TEST_F(PostgresRecordsTest, AnOfferEnds) {
+  const auto first = Open("first", absl::Hours(1)).value();
+  const auto second = Open("second").value();
+  for (const uint64_t number : {1, 2, 3, 4}) {
+    ASSERT_TRUE(Create(*first, number).ok());
+    ASSERT_TRUE(Offer(*first, number).ok());
+  }
+  EXPECT_THAT(*first->ListOffered(), SizeIs(4));
+  ASSERT_TRUE(Offer(*first, 1, /*stands=*/false).ok());
+  store::v1::OperationRecord operation;
+  operation.set_number(1);
+  ASSERT_TRUE(
+      first
+          ->Apply({.session = SessionName(2), .epoch = first->epoch(), .operations = {operation}}, Survives::kPowerLoss)
+          .ok());
+  ASSERT_TRUE(Update(*first, 3, first->epoch(), 3).ok());  // its labels, for example: the operation waits still
+  EXPECT_THAT(*first->ListOffered(), UnorderedElementsAre(SessionName(3), SessionName(4)));
+  EXPECT_THAT(NamesOf(*second->TakeOffered({.sessions = 1})), ElementsAre(SessionName(3)));
+  server_->Run("UPDATE wellspace.owners SET lease_until = clock_timestamp() WHERE name = 'first'", database_);
+  EXPECT_THAT(*second->TakeOrphans(), SizeIs(3));
+  EXPECT_THAT(*second->ListOffered(), IsEmpty());
+}
+
+TEST_F(PostgresRecordsTest, WhoTakesWaitsForNoOne) {
+  const auto first = Open("first").value();
+  constexpr uint64_t kSessions = 40;
+  for (uint64_t number = 1; number <= kSessions; ++number) {
+    ASSERT_TRUE(Create(*first, number).ok());
+    ASSERT_TRUE(Offer(*first, number).ok());
+  }
+  // The first is being changed by its owner, and stays so.
+  pqxx::connection connection(address_);
+  pqxx::work change(connection);
+  change.exec("SELECT FROM wellspace.sessions WHERE name = '" + SessionName(1) + "' FOR UPDATE");
+  std::vector<std::unique_ptr<PostgresRecords>> others;
+  std::vector<std::vector<std::string>> taken(3);
+  std::vector<std::jthread> threads;
+  for (size_t i = 0; i < taken.size(); ++i) {
+    others.push_back(Open(absl::StrCat("other ", i)).value());
+  }
+  for (size_t i = 0; i < taken.size(); ++i) {
+    threads.emplace_back([&, i] {
+      for (int round = 0; round < 40; ++round) {
+        for (std::string& name : NamesOf(others[i]->TakeOffered({.sessions = 2}).value())) {
+          taken[i].push_back(std::move(name));
+        }
+      }
+    });
+  }
+  threads.clear();
+  std::vector<std::string> all;
+  for (const std::vector<std::string>& names : taken) {
+    all.insert(all.end(), names.begin(), names.end());
+  }
+  EXPECT_THAT(all, SizeIs(kSessions - 1));
+  EXPECT_THAT(std::set<std::string>(all.begin(), all.end()), SizeIs(kSessions - 1)) << "none twice";
+  EXPECT_THAT(*first->ListOffered(), ElementsAre(SessionName(1)));
+  change.abort();
+  EXPECT_THAT(NamesOf(*others[0]->TakeOffered({.sessions = 2})), ElementsAre(SessionName(1)));
+}
+
 TEST_F(PostgresRecordsTest, AnOwnerKnowsWhenItsLeaseIsOut) {
   const auto first = Open("first").value();
   EXPECT_TRUE(first->CheckOwnership().ok());
