@@ -1,13 +1,9 @@
 // Real servers that share a PostgreSQL and a folder: where one ends, dies or stands still, another goes on.
 #include <signal.h>
 
-#include <array>
 #include <atomic>
 #include <chrono>
-#include <functional>
 #include <memory>
-#include <optional>
-#include <random>
 #include <string>
 #include <thread>
 #include <utility>
@@ -22,6 +18,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "tests/server/daemon.h"
+#include "tests/server/mortal_replicas.h"
 #include "tests/server/recorder.h"
 #include "tests/server/replicas_fixture.h"
 #include "tests/server/session_calls.h"
@@ -294,73 +291,16 @@ TEST_F(ReplicasTest, ThePasswordIsNowhere) {
               AllOf(HasSubstr("--store"), Not(HasSubstr("cret"))));
 }
 
-// Two of them, each of which comes back where clients look for it.
-class MortalReplicas {
- public:
-  using Options = std::function<std::vector<std::string>(const std::string& name)>;
-
-  MortalReplicas(Options options, std::string errors) : options_(std::move(options)), errors_(std::move(errors)) {
-    for (size_t i = 0; i < kNames.size(); ++i) {
-      addresses_.push_back("127.0.0.1:0");
-      servers_.emplace_back();
-      Start(i);
-      addresses_[i] = servers_[i]->address();
-    }
-  }
-
-  const std::vector<std::string>& addresses() const { return addresses_; }
-
-  // A fault of one of them, or of the database.
-  void Suffer(int fault, size_t which) {
-    if (fault % 4 == 3) {
-      PostgresServer::OfThisProgram().Kill();
-      PostgresServer::OfThisProgram().Start();
-      return;
-    }
-    Subprocess& process = servers_[which]->process();
-    if (fault % 4 == 2) {
-      process.Signal(SIGSTOP);
-      std::this_thread::sleep_for(absl::ToChronoMilliseconds(kLease + absl::Seconds(2)));
-      process.Signal(SIGCONT);
-      std::this_thread::sleep_for(std::chrono::milliseconds(300));  // it answers those who have waited for it
-    }
-    process.Signal(fault % 4 == 0 ? SIGKILL : SIGTERM);
-    process.Wait();
-    Start(which);
-  }
-
-  void Stop() {
-    for (const auto& server : servers_) {
-      server->Stop();
-    }
-  }
-
- private:
-  static constexpr std::array<const char*, 2> kNames = {"first", "second"};
-
-  void Start(size_t i) {
-    std::vector<std::string> options = options_(kNames[i]);
-    options.insert(options.end(), {"--grace", "1", "--listen", addresses_[i]});
-    servers_[i] = std::make_unique<Daemon>(options, absl::StrCat(errors_, "/", kNames[i]), "", Daemon::Listen::kAsTold);
-  }
-
-  const Options options_;
-  const std::string errors_;
-  std::vector<std::string> addresses_;
-  std::vector<std::unique_ptr<Daemon>> servers_;
-};
-
 // Servers die, are drained and stand still, and the database is restarted, while clients go on: all that any server has
 // acknowledged is there, each request was done once.
 TEST_F(ReplicasTest, NothingIsLostAmongClientsThatGoOn) {
-  const uint32_t seed = std::random_device()();
-  SCOPED_TRACE(absl::StrCat("seed ", seed));
-  std::minstd_rand random(seed);
-  MortalReplicas replicas([this](const std::string& name) { return Options(name); }, errors_.path());
-  const Recorded recorded = RecordAmongFaults(replicas.addresses(), kClients, kFaults, [&](int i) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(200 + random() % 1000));
-    replicas.Suffer(i, random() % replicas.addresses().size());
-  });
+  std::vector<MortalReplicas::Place> places;
+  for (const std::string name : {"first", "second"}) {
+    places.push_back({.options = Options(name), .address = "127.0.0.1:0", .error_path = ErrorPath(name)});
+  }
+  MortalReplicas replicas(std::move(places), kLease, PostgresServer::OfThisProgram());
+  const Recorded recorded =
+      RecordAmongFaults(replicas.addresses(), kClients, kFaults, replicas.Faults(), replicas.size());
   replicas.Stop();
   RecordProperty("sessions", recorded.lives);
   RecordProperty("redirected", recorded.redirected);
