@@ -50,8 +50,12 @@ bool Recorder::Try(const std::function<grpc::Status(grpc::ClientContext&)>& call
     const bool is_busy = DetailsOf(status).reason == "SESSION_BUSY";
     // Of gRPC, for a call that came to a server while that shut down: without a reason.
     const bool is_shut_down = status.error_code() == grpc::StatusCode::CANCELLED && DetailsOf(status).reason.empty();
+    // Of gRPC, too, for a stream that a proxy has broken off between two messages.
+    const bool is_broken_off =
+        status.error_code() == grpc::StatusCode::UNKNOWN && status.error_message() == "Stream removed";
     const bool is_late = status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED && is_impatient;
-    if (status.error_code() != grpc::StatusCode::UNAVAILABLE && !is_busy && !is_shut_down && !is_late) {
+    if (status.error_code() != grpc::StatusCode::UNAVAILABLE && !is_busy && !is_shut_down && !is_broken_off &&
+        !is_late) {
       ADD_FAILURE() << status.error_code() << " " << status.error_message() << " from " << server().address;
       return false;
     }

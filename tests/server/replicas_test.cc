@@ -15,8 +15,10 @@
 #include "client/error_details.h"
 #include "client/mesh_sink.h"
 #include "client/point_source.h"
+#include "core/meshers/meshing_version.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
+#include "server/store/postgres_rows.h"
 #include "tests/server/daemon.h"
 #include "tests/server/mortal_replicas.h"
 #include "tests/server/recorder.h"
@@ -221,6 +223,48 @@ TEST_F(ReplicasTest, WhoStoodStillChangesNothing) {
   UseSession(*second, name, mesh);
   const auto again = Start("first");
   EXPECT_EQ(CallsOf(*again).List({}).sessions_size(), 0);
+}
+
+// A newer server, which meshes otherwise, has had the session: its mesh is there to the bit, and so is its input; work
+// goes on with a structure of this one's own.
+TEST_F(ReplicasTest, WhatANewerServerHasMadeIsKept) {
+  auto newer = Start("newer");
+  const auto older = Start("older");
+  const std::string name = MakeSession(*newer);
+  const std::string mesh = CallsOf(*newer).MeshBytes(name);
+  newer->process().Signal(SIGKILL);
+  newer->process().Wait();
+  pqxx::connection connection(store_);
+  pqxx::work transaction(connection);
+  int changed = 0;
+  for (const pqxx::row& row :
+       transaction.exec("SELECT session, number, kind, record, crc32c FROM wellspace.steps ORDER BY number")) {
+    store::v1::StepRecord step = sql::ParseStep(row).value();
+    if (step.has_refined() && step.refined().begins()) {
+      step.mutable_refined()->set_meshing_version(core::kMeshingVersion + 1);
+      const std::string record = step.SerializeAsString();
+      const std::string key = KeyOfStep(row[0].as<int64_t>(), row[1].as<int64_t>(), row[2].as<int64_t>());
+      transaction.exec_params0("UPDATE wellspace.steps SET record = $3, crc32c = $4 WHERE session = $1 AND number = $2",
+                               row[0].as<int64_t>(), row[1].as<int64_t>(), sql::Blob(record),
+                               sql::Checksum(key, record));
+      ++changed;
+    }
+  }
+  transaction.commit();
+  EXPECT_EQ(changed, 1);
+  AwaitSession(*older, name);
+  SessionCalls calls = CallsOf(*older);
+  EXPECT_EQ(calls.MeshBytes(name), mesh);
+  grpc::ClientContext context;
+  v1::AddVerticesRequest add;
+  add.set_name(name);
+  add.mutable_points()->Add(0.501);
+  add.mutable_points()->Add(0.499);
+  v1::AddVerticesResponse added;
+  const grpc::Status without = calls.queries().AddVertices(&context, add, &added);
+  EXPECT_EQ(without.error_code(), grpc::StatusCode::FAILED_PRECONDITION) << without.error_message();
+  EXPECT_EQ(calls.Refine(name).state(), v1::Operation::STATE_SUCCEEDED);
+  UseSession(*older, name, calls.MeshBytes(name), /*operations=*/2);
 }
 
 // A server with a folder of its own becomes one of several, and alone again.
