@@ -13,7 +13,7 @@ declare -A packages=(
            prometheus-cpp-dev libcairo2-dev libmetis-dev libmicrohttpd-dev zlib1g-dev liblzma-dev libminizip-dev libhdf5-dev
            libsqlite3-dev libpqxx-dev python3"
   [test]="libgtest-dev libgmock-dev libcgal-dev libeigen3-dev python3 python3-grpcio python3-meshio python3-numpy openssl
-          metis postgresql-15 haproxy python3-protobuf python3-scipy python3-tqdm python3-yaml libisal2 mypy
+          metis postgresql-15 haproxy iproute2 libfaketime python3-protobuf python3-scipy python3-tqdm python3-yaml libisal2 mypy
           python3-build python3-numpydoc python3-pip python3-setuptools python3-sphinx python3-venv python3-wheel"
   [interoperability]="gmsh freefem++ python3-gmsh python3-h5py python3-meshio python3-vtk9 python3-numpy fish zsh"
   [solvers]="calculix-ccx openfoam python3-dolfinx python3-mpi4py python3-petsc4py"

@@ -11,6 +11,7 @@
 #include <string>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include "client/error_details.h"
 #include "client/printable.h"
@@ -23,6 +24,8 @@ namespace {
 // The one error that comes without details: the server sends it ahead of a message that is not read, and can add none.
 // Its message begins so.
 constexpr char kReaderStalled[] = "READER_STALLED";
+// What gRPC says, with the code UNKNOWN, of a stream that a proxy has broken off between two messages.
+constexpr char kBrokenOff[] = "Stream removed";
 
 // The key by which proxies send all calls on a session to one server.
 constexpr char kSessionMetadata[] = "wellspace-session";
@@ -62,6 +65,9 @@ absl::Status FromGrpcStatus(const grpc::Status& status) {
     info.set_reason("ERROR_REASON_READER_STALLED");
     details.add_details()->PackFrom(info);
     AddDetails(details, result);
+  }
+  if (absl::IsUnknown(result) && status.error_details().empty() && result.message() == kBrokenOff) {
+    return absl::UnavailableError(absl::StrCat("the connection broke off: ", kBrokenOff));
   }
   return result;
 }

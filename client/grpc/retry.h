@@ -17,7 +17,7 @@
 namespace wellspace::client {
 
 // The status of a call as the library returns it: code, message without control characters, and the google.rpc details
-// as payloads under their type URLs.
+// as payloads under their type URLs. A connection that broke is UNAVAILABLE, however gRPC has noticed it.
 absl::Status FromGrpcStatus(const grpc::Status& status);
 
 // A clock for timeouts: it does not jump when that on the wall is set. Zero when the machine was started, sleep

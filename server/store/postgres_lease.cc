@@ -48,10 +48,10 @@ PostgresLease::~PostgresLease() {
 
 absl::Status PostgresLease::Begin(const std::function<absl::Status(pqxx::dbtransaction& transaction)>& take) {
   // One of this name that died was heard of a lease ago at most. One that lives renews its lease meanwhile.
-  const absl::Time deadline = absl::Now() + length_ + length_ / kRenewals;
+  const absl::Duration deadline = SinceBoot() + length_ + length_ / kRenewals;
   for (bool lives = true; lives;) {
     WELLSPACE_RETURN_IF_ERROR(TryToBegin(take, &lives));
-    if (lives && absl::Now() > deadline) {
+    if (lives && SinceBoot() > deadline) {
       return absl::FailedPreconditionError(absl::StrCat("another server with the name '", name_,
                                                         "' has sessions in this database, and lives; give each server "
                                                         "a name of its own"));

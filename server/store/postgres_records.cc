@@ -8,7 +8,6 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
-#include "absl/time/clock.h"
 #include "core/base/status_macros.h"
 #include "server/store/postgres_rows.h"
 #include "server/store/postgres_schema.h"
@@ -95,6 +94,10 @@ void TakeFromTheDead(pqxx::dbtransaction& transaction, int64_t owner, uint64_t e
                              owner, epoch, id);
     transaction.exec_params0("DELETE FROM wellspace.owners WHERE id = $1", id);
   }
+  // Nobody looks for the numbers of transactions of a day ago. A link that is in use writes its own anew.
+  transaction.exec0(
+      "DELETE FROM wellspace.commits WHERE link IN (SELECT link FROM wellspace.commits"
+      " WHERE time < clock_timestamp() - interval '1 day' FOR UPDATE SKIP LOCKED)");
 }
 
 // Holds database and folder to one another.
@@ -214,8 +217,8 @@ absl::StatusOr<std::vector<StoredSession>> PostgresRecords::TakeOrphans() {
     // Not that of this process: one that it has had may be that of a session which it gets back.
     const auto epoch = transaction.exec1("SELECT nextval('wellspace.epochs')")[0].as<uint64_t>();
     TakeFromTheDead(transaction, lease_.owner(), epoch, is_steady);
-    transaction.exec_params0("DELETE FROM wellspace.answers WHERE time < $1",
-                             absl::ToUnixNanos(absl::Now() - kKeptAnswers));
+    transaction.exec_params0("DELETE FROM wellspace.answers WHERE time < clock_timestamp() - make_interval(secs => $1)",
+                             absl::ToDoubleSeconds(kKeptAnswers));
     WELLSPACE_ASSIGN_OR_RETURN(
         taken, LoadSessions(transaction, absl::StrCat("owner = ", lease_.owner(), " AND epoch = ", epoch)));
     return absl::OkStatus();

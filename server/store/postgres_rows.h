@@ -132,9 +132,9 @@ class PostgresRows final : public RecordRows {
   absl::Status DropSizes(int64_t session, int64_t number) override { return Run(kDropSizes, session, number); }
 
   absl::StatusOr<bool> InsertAnswer(const store::v1::AnswerRecord& answer, const std::string& record) override {
-    const pqxx::result inserted = transaction_.exec_prepared(
-        kInsertAnswer, Blob(answer.tenant()), Blob(answer.request_id()), Blob(record), answer.time_ns(),
-        Checksum(KeyOfAnswer(answer.tenant(), answer.request_id()), record));
+    const pqxx::result inserted =
+        transaction_.exec_prepared(kInsertAnswer, Blob(answer.tenant()), Blob(answer.request_id()), Blob(record),
+                                   Checksum(KeyOfAnswer(answer.tenant(), answer.request_id()), record));
     return inserted.affected_rows() > 0;
   }
 

@@ -9,7 +9,7 @@
 namespace wellspace::server {
 namespace {
 
-constexpr int kOldestServer = 130000;  // pg_current_xact_id, gen_random_uuid
+constexpr int kOldestServer = 130000;  // gen_random_uuid
 
 // Those who make the tables at once wait for this.
 constexpr char kLockSchema[] = "SELECT pg_advisory_xact_lock(5995635)";
@@ -45,7 +45,10 @@ constexpr std::array kPostgresMigrations = {
     "                             number bigint NOT NULL, part bigint NOT NULL, record bytea NOT NULL,"
     "                             crc32c bigint NOT NULL, PRIMARY KEY(session, number, part));"
     "CREATE TABLE wellspace.answers(tenant bytea NOT NULL, request_id bytea NOT NULL, record bytea NOT NULL,"
-    "                               time bigint NOT NULL, crc32c bigint NOT NULL, PRIMARY KEY(tenant, request_id));",
+    "                               time timestamptz NOT NULL, crc32c bigint NOT NULL,"
+    "                               PRIMARY KEY(tenant, request_id));"
+    // The last transaction of each link that was committed (PostgresLink). time: of that.
+    "CREATE TABLE wellspace.commits(link text PRIMARY KEY, number bigint NOT NULL, time timestamptz NOT NULL);",
 };
 constexpr int kVersion = kFirstVersion + static_cast<int>(kPostgresMigrations.size()) - 1;
 
@@ -92,7 +95,9 @@ constexpr std::pair<const char*, const char*> kStatements[] = {
      " WHERE session = (SELECT id FROM wellspace.sessions WHERE name = $1) ORDER BY number, part"},
     {sql::kDropSizes, "DELETE FROM wellspace.sizes WHERE session = $1 AND number = $2"},
     {sql::kInsertAnswer,
-     "INSERT INTO wellspace.answers(tenant, request_id, record, time, crc32c) VALUES($1, $2, $3, $4, $5)"
+     // By the clock of the database: those of servers may be hours apart, and jump.
+     "INSERT INTO wellspace.answers(tenant, request_id, record, time, crc32c)"
+     " VALUES($1, $2, $3, clock_timestamp(), $4)"
      " ON CONFLICT DO NOTHING"},
     {sql::kReadAnswer,
      "SELECT tenant, request_id, record, crc32c FROM wellspace.answers WHERE tenant = $1 AND request_id = $2"},
@@ -135,14 +140,16 @@ void PreparePostgres(pqxx::connection& connection) {
 }
 
 absl::Status OpenPostgresSchema(PostgresLink& link) {
-  absl::Status opened = link.Transact([](pqxx::dbtransaction& transaction) {
-    const int version = transaction.conn().server_version();
-    return version < kOldestServer
-               ? absl::FailedPreconditionError(absl::StrCat("PostgreSQL ", version / 10000,
-                                                            " is too old; 13 and later are known to have all that it "
-                                                            "takes"))
-               : Migrate(transaction);
-  });
+  absl::Status opened = link.Transact(
+      [](pqxx::dbtransaction& transaction) {
+        const int version = transaction.conn().server_version();
+        return version < kOldestServer ? absl::FailedPreconditionError(
+                                             absl::StrCat("PostgreSQL ", version / 10000,
+                                                          " is too old; 13 and later are known to have all that it "
+                                                          "takes"))
+                                       : Migrate(transaction);
+      },
+      PostgresLink::Doubt::kRunAgain);
   if (!absl::IsPermissionDenied(opened)) {
     return opened;
   }

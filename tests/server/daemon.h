@@ -28,13 +28,13 @@ inline absl::Status MeshTriangle(client::Client client) {
 // A wellspaced on a free port.
 class Daemon {
  public:
-  // Its standard error is the test's, or goes to the file `error_path`. `limits`: see Subprocess.
+  // Its standard error is the test's, or goes to the file `error_path`. `before`: see Subprocess.
   // kAsTold: the arguments say where it listens.
   enum class Listen { kAnywhere, kAsTold };
   explicit Daemon(std::vector<std::string> arguments = {}, const std::string& error_path = "",
-                  const std::string& limits = "", Listen listen = Listen::kAnywhere)
+                  const std::vector<std::string>& before = {}, Listen listen = Listen::kAnywhere)
       : process_("wellspaced", listen == Listen::kAsTold ? std::move(arguments) : Listening(std::move(arguments)),
-                 error_path, limits) {
+                 error_path, before) {
     const std::string line = process_.ReadLine();
     const std::string prefix = "listening on ";
     EXPECT_EQ(line.substr(0, prefix.size()), prefix);

@@ -37,7 +37,7 @@ class FileDescriptors : public ::testing::Test {
  protected:
   FileDescriptors() {
     daemon_ = std::make_unique<Daemon>(std::vector<std::string>(), folder_.Path("log"),
-                                       absl::StrCat("ulimit -n ", kDescriptors));
+                                       AfterShell(absl::StrCat("ulimit -n ", kDescriptors)));
   }
 
   ~FileDescriptors() override {
@@ -134,7 +134,7 @@ TEST_F(FileDescriptors, NoneAtAllMakeConnectionsWait) {
 
 // The hard limit, which the system grants for the asking.
 TEST(DescriptorLimit, IsRaisedAtTheStart) {
-  Daemon daemon({}, "", "ulimit -Sn 100; ulimit -Hn 300");
+  Daemon daemon({}, "", AfterShell("ulimit -Sn 100; ulimit -Hn 300"));
   rlimit limit = {};
   ASSERT_EQ(prlimit(daemon.process().pid(), RLIMIT_NOFILE, nullptr, &limit), 0);
   EXPECT_EQ(limit.rlim_cur, 300u);
@@ -183,7 +183,7 @@ TEST(DurableFileDescriptors, UsedUpByConnectionsAndUploadsLoseNothing) {
   constexpr int kUploads = 100;
   const TemporaryFolder folder;
   Daemon daemon({"--data", folder.Path("data"), "--max-sessions-per-tenant", "1000"}, folder.Path("log"),
-                absl::StrCat("ulimit -n ", kLimit));
+                AfterShell(absl::StrCat("ulimit -n ", kLimit)));
   const client::Client first = daemon.Client();
   ASSERT_EQ(MeshTriangle(first), absl::OkStatus());
   SessionCalls calls(grpc::CreateChannel(daemon.address(), grpc::InsecureChannelCredentials()));
@@ -221,7 +221,8 @@ TEST(DurableFileDescriptors, UsedUpByConnectionsAndUploadsLoseNothing) {
 // A file that must not grow further is a full disk: its server reads on, and says so.
 TEST(DurableFileDescriptors, AFileThatMustNotGrowIsAFullDisk) {
   const TemporaryFolder folder;
-  Daemon daemon({"--data", folder.Path("data")}, folder.Path("log"), "ulimit -f 40960");  // blocks of 512 bytes
+  Daemon daemon({"--data", folder.Path("data")}, folder.Path("log"),
+                AfterShell("ulimit -f 40960"));  // blocks of 512 bytes
   SessionCalls calls(grpc::CreateChannel(daemon.address(), grpc::InsecureChannelCredentials()));
   const std::string name = calls.Create().name();
   constexpr uint64_t kPiece = 100'000;

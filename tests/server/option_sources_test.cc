@@ -28,7 +28,7 @@ struct Result {
 Result RunServer(const std::vector<std::string>& arguments, const std::string& environment = "") {
   const TemporaryFolder folder;
   Subprocess process("wellspaced", arguments, folder.Path("errors"),
-                     environment.empty() ? "" : "export " + environment);
+                     AfterShell(environment.empty() ? ":" : "export " + environment));
   Result result;
   for (std::string line = process.ReadLine(); !line.empty(); line = process.ReadLine()) {
     result.out += line + "\n";
@@ -42,7 +42,7 @@ TEST(OptionSources, TheCommandLineWinsThenTheEnvironmentThenTheFile) {
   const TemporaryFolder folder;
   const std::string file = folder.Write("wellspaced.toml", "max-points = 2\nmax-vertices = 1000\nworkers = 5\n");
   Daemon daemon({"--workers", "3", "--config", file}, "",
-                "export WELLSPACED_WORKERS=4 WELLSPACED_MAX_VERTICES=2000 WELLSPACED_LISTEN=127.0.0.1:1");
+                AfterShell("export WELLSPACED_WORKERS=4 WELLSPACED_MAX_VERTICES=2000 WELLSPACED_LISTEN=127.0.0.1:1"));
   const absl::StatusOr<client::ServerInfo> info = daemon.Client().GetServerInfo();
   ASSERT_TRUE(info.ok()) << info.status();
   EXPECT_EQ(info->workers, 3);

@@ -6,6 +6,7 @@
 
 #include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_replace.h"
 #include "absl/time/clock.h"
 #include "grpcpp/grpcpp.h"
 #include "proto/checksum.h"
@@ -17,8 +18,9 @@ constexpr int kDimension = 2;
 
 }  // namespace
 
-Recorder::Recorder(const std::vector<std::string>& addresses, int number, const std::atomic<bool>& is_over)
-    : prefix_(absl::StrCat("client-", number, "-")), random_(number), is_over_(is_over) {
+Recorder::Recorder(const std::vector<std::string>& addresses, int number, const std::atomic<bool>& is_over,
+                   absl::Duration patience)
+    : prefix_(absl::StrCat("client-", number, "-")), random_(number), is_over_(is_over), patience_(patience) {
   for (const std::string& address : addresses) {
     grpc::ChannelArguments arguments;
     arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 20);
@@ -38,7 +40,8 @@ bool Recorder::Try(const std::function<grpc::Status(grpc::ClientContext&)>& call
   while (absl::Now() < deadline) {
     grpc::ClientContext context;
     context.set_wait_for_ready(servers_.size() == 1);
-    context.set_deadline(absl::ToChronoTime(absl::Now() + absl::Seconds(60)));
+    const bool is_impatient = patience_ > absl::ZeroDuration();
+    context.set_deadline(absl::ToChronoTime(absl::Now() + (is_impatient ? patience_ : absl::Minutes(1))));
     const grpc::Status status = call(context);
     if (status.error_code() == expected) {
       return true;
@@ -47,7 +50,12 @@ bool Recorder::Try(const std::function<grpc::Status(grpc::ClientContext&)>& call
     const bool is_busy = DetailsOf(status).reason == "SESSION_BUSY";
     // Of gRPC, for a call that came to a server while that shut down: without a reason.
     const bool is_shut_down = status.error_code() == grpc::StatusCode::CANCELLED && DetailsOf(status).reason.empty();
-    if (status.error_code() != grpc::StatusCode::UNAVAILABLE && !is_busy && !is_shut_down) {
+    // Of gRPC, too, for a stream that a proxy has broken off between two messages.
+    const bool is_broken_off =
+        status.error_code() == grpc::StatusCode::UNKNOWN && status.error_message() == "Stream removed";
+    const bool is_late = status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED && is_impatient;
+    if (status.error_code() != grpc::StatusCode::UNAVAILABLE && !is_busy && !is_shut_down && !is_broken_off &&
+        !is_late) {
       ADD_FAILURE() << status.error_code() << " " << status.error_message() << " from " << server().address;
       return false;
     }
@@ -147,6 +155,10 @@ bool Recorder::Create(Acknowledged& known) {
   if (response.has_value()) {
     known.name = response->session().name();
     known.revision = response->session().revision();
+    told_.push_back({.of = Acknowledgement::Of::kCreation,
+                     .session = known.name,
+                     .request_id = known.label,
+                     .revision = known.revision});
   }
   return response.has_value();
 }
@@ -165,6 +177,9 @@ bool Recorder::Upload(Acknowledged& known) {
   EXPECT_EQ(response.committed_points(), known.points);
   EXPECT_GT(response.revision(), known.revision);
   known.revision = response.revision();
+  if (has_come) {
+    told_.push_back({.session = known.name, .revision = known.revision});
+  }
   return has_come;
 }
 
@@ -179,6 +194,7 @@ bool Recorder::Add(Acknowledged& known) {
     known.points += points.size() / kDimension;
     EXPECT_EQ(response->revision(), known.revision + 1) << "it was done once";
     known.revision = response->revision();
+    told_.push_back({.session = known.name, .request_id = request.request_id(), .revision = known.revision});
   }
   return response.has_value();
 }
@@ -191,6 +207,7 @@ bool Recorder::Refine(Acknowledged& known) {
   if (!started.has_value()) {
     return false;
   }
+  told_.push_back({.of = Acknowledgement::Of::kOperation, .session = known.name, .request_id = request.request_id()});
   v1::GetOperationRequest get;
   get.set_name(started->operation().name());
   std::optional<v1::GetOperationResponse> seen;
@@ -208,6 +225,7 @@ bool Recorder::Refine(Acknowledged& known) {
   EXPECT_GT(seen->operation().mesh_revision(), known.revision);
   known.mesh_revision = known.revision = seen->operation().mesh_revision();
   known.mesh_crc32c = Checksum(known.name, known.mesh_revision);
+  told_.push_back({.session = known.name, .revision = known.revision});
   return true;
 }
 
@@ -218,14 +236,22 @@ bool Recorder::Update(Acknowledged& known) {
   known.label = NextId();
   (*request.mutable_session()->mutable_labels())["label"] = known.label;
   request.set_request_id(known.label);
-  return Ask(&Server::sessions, &v1::SessionService::Stub::UpdateSession, request).has_value();
+  const bool is_done = Ask(&Server::sessions, &v1::SessionService::Stub::UpdateSession, request).has_value();
+  if (is_done) {
+    told_.push_back({.session = known.name, .request_id = request.request_id()});
+  }
+  return is_done;
 }
 
 bool Recorder::Delete(const Acknowledged& known) {
   v1::DeleteSessionRequest request;
   request.set_name(known.name);
   request.set_request_id(NextId());
-  return Ask(&Server::sessions, &v1::SessionService::Stub::DeleteSession, request).has_value();
+  const bool is_done = Ask(&Server::sessions, &v1::SessionService::Stub::DeleteSession, request).has_value();
+  if (is_done) {
+    told_.push_back({.of = Acknowledgement::Of::kDeletion, .session = known.name, .request_id = request.request_id()});
+  }
+  return is_done;
 }
 
 void Recorder::Live() {
@@ -262,13 +288,13 @@ void Recorder::Live() {
 }
 
 Recorded RecordAmongFaults(const std::vector<std::string>& addresses, int clients, int faults,
-                           const std::function<void(int)>& fault) {
+                           const std::function<void(int)>& fault, absl::Duration patience) {
   std::atomic<bool> is_over = false;
   std::vector<std::unique_ptr<Recorder>> recorders;
   std::vector<std::jthread> threads;
   const absl::Cleanup end = [&] { is_over = true; };  // an exception, too, is no reason to wait for ever
   for (int i = 0; i < clients; ++i) {
-    recorders.push_back(std::make_unique<Recorder>(addresses, i, is_over));
+    recorders.push_back(std::make_unique<Recorder>(addresses, i, is_over, patience));
     threads.emplace_back([recorder = recorders.back().get()] { recorder->Run(); });
   }
   for (int i = 0; i < faults && !::testing::Test::HasFailure(); ++i) {
@@ -280,10 +306,33 @@ Recorded RecordAmongFaults(const std::vector<std::string>& addresses, int client
     threads[i].join();
     recorded.lives += recorders[i]->lives();
     recorded.redirected += recorders[i]->redirected();
+    recorded.told.insert(recorded.told.end(), recorders[i]->told().begin(), recorders[i]->told().end());
   }
   EXPECT_GT(recorded.lives, 0);
   for (const auto& recorder : recorders) {
     recorder->CheckAll();
+  }
+  return recorded;
+}
+
+Recorded RecordAmongFaults(const std::vector<std::string>& addresses, int clients, int count,
+                           const std::vector<Fault>& faults, size_t servers, absl::Duration patience) {
+  const uint32_t seed = std::random_device()();
+  SCOPED_TRACE(absl::StrCat("seed ", seed));
+  std::minstd_rand random(seed);
+  std::map<std::string, int> counts;
+  Recorded recorded = RecordAmongFaults(
+      addresses, clients, count,
+      [&](int i) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(200 + random() % 1000));
+        const Fault& fault = faults[i % faults.size()];
+        fault.strike(random() % servers);
+        ++counts[fault.kind];
+      },
+      patience);
+  recorded.faults = std::move(counts);
+  for (const auto& [kind, number] : recorded.faults) {
+    ::testing::Test::RecordProperty(absl::StrReplaceAll(kind, {{" ", "_"}}), number);
   }
   return recorded;
 }

@@ -5,13 +5,16 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <random>
 #include <string>
 #include <vector>
 
+#include "absl/time/time.h"
 #include "gtest/gtest.h"
+#include "tests/server/merged_history.h"
 #include "tests/server/session_calls.h"
 
 namespace wellspace::server {
@@ -22,8 +25,10 @@ namespace wellspace::server {
 // Thread safety: thread-compatible.
 class Recorder {
  public:
-  // `addresses`: of servers that share their sessions. `is_over`: when it is to end.
-  Recorder(const std::vector<std::string>& addresses, int number, const std::atomic<bool>& is_over);
+  // `addresses`: of servers that share their sessions. `is_over`: when it is to end. `patience`: with one call, which
+  // is made again behind it; zero: a call that is not answered in a minute is a failure.
+  Recorder(const std::vector<std::string>& addresses, int number, const std::atomic<bool>& is_over,
+           absl::Duration patience = absl::ZeroDuration());
 
   // Lives of sessions, one after the other, until the end.
   void Run();
@@ -31,6 +36,7 @@ class Recorder {
   int lives() const { return lives_; }
   // Calls that went to another server than the one before, since that one had said where the session is.
   int redirected() const { return redirected_; }
+  const std::vector<Acknowledgement>& told() const { return told_; }
 
   // Expects all acknowledged data to be there in the end.
   void CheckAll();
@@ -90,6 +96,7 @@ class Recorder {
   const std::string prefix_;
   std::minstd_rand random_;
   const std::atomic<bool>& is_over_;
+  const absl::Duration patience_;
   std::vector<Server> servers_;
   size_t current_ = 0;  // of servers_: the one that is asked
   uint64_t next_id_ = 0;
@@ -97,18 +104,33 @@ class Recorder {
   int redirected_ = 0;
   std::vector<Acknowledged> kept_;
   std::vector<std::string> deleted_;
+  std::vector<Acknowledgement> told_;
 };
 
 // What clients have done that go on while there are faults.
 struct Recorded {
   int lives = 0;
   int redirected = 0;
+  std::map<std::string, int> faults{};  // by their kinds
+  std::vector<Acknowledgement> told{};  // of all clients
 };
 
 // Has `clients` clients of `addresses` live sessions, and calls fault(i) for i from 0 to `faults` - 1 meanwhile, until
-// the first failure. Expects all acknowledged data to be there in the end.
+// the first failure. Expects all acknowledged data to be there in the end. `patience`: see Recorder.
 Recorded RecordAmongFaults(const std::vector<std::string>& addresses, int clients, int faults,
-                           const std::function<void(int)>& fault);
+                           const std::function<void(int)>& fault, absl::Duration patience = absl::ZeroDuration());
+
+// Something that happens to one of several servers, or to all.
+struct Fault {
+  std::string kind;
+  std::function<void(size_t which)> strike;
+};
+
+// The same with `count` faults, of each kind in turn, each a moment after the one before, of a server that is drawn.
+// Prints what is drawn with, if anything fails.
+Recorded RecordAmongFaults(const std::vector<std::string>& addresses, int clients, int count,
+                           const std::vector<Fault>& faults, size_t servers,
+                           absl::Duration patience = absl::ZeroDuration());
 
 }  // namespace wellspace::server
 

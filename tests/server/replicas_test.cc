@@ -1,13 +1,9 @@
 // Real servers that share a PostgreSQL and a folder: where one ends, dies or stands still, another goes on.
 #include <signal.h>
 
-#include <array>
 #include <atomic>
 #include <chrono>
-#include <functional>
 #include <memory>
-#include <optional>
-#include <random>
 #include <string>
 #include <thread>
 #include <utility>
@@ -19,9 +15,12 @@
 #include "client/error_details.h"
 #include "client/mesh_sink.h"
 #include "client/point_source.h"
+#include "core/meshers/meshing_version.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
+#include "server/store/postgres_rows.h"
 #include "tests/server/daemon.h"
+#include "tests/server/mortal_replicas.h"
 #include "tests/server/recorder.h"
 #include "tests/server/replicas_fixture.h"
 #include "tests/server/session_calls.h"
@@ -226,6 +225,48 @@ TEST_F(ReplicasTest, WhoStoodStillChangesNothing) {
   EXPECT_EQ(CallsOf(*again).List({}).sessions_size(), 0);
 }
 
+// A newer server, which meshes otherwise, has had the session: its mesh is there to the bit, and so is its input; work
+// goes on with a structure of this one's own.
+TEST_F(ReplicasTest, WhatANewerServerHasMadeIsKept) {
+  auto newer = Start("newer");
+  const auto older = Start("older");
+  const std::string name = MakeSession(*newer);
+  const std::string mesh = CallsOf(*newer).MeshBytes(name);
+  newer->process().Signal(SIGKILL);
+  newer->process().Wait();
+  pqxx::connection connection(store_);
+  pqxx::work transaction(connection);
+  int changed = 0;
+  for (const pqxx::row& row :
+       transaction.exec("SELECT session, number, kind, record, crc32c FROM wellspace.steps ORDER BY number")) {
+    store::v1::StepRecord step = sql::ParseStep(row).value();
+    if (step.has_refined() && step.refined().begins()) {
+      step.mutable_refined()->set_meshing_version(core::kMeshingVersion + 1);
+      const std::string record = step.SerializeAsString();
+      const std::string key = KeyOfStep(row[0].as<int64_t>(), row[1].as<int64_t>(), row[2].as<int64_t>());
+      transaction.exec_params0("UPDATE wellspace.steps SET record = $3, crc32c = $4 WHERE session = $1 AND number = $2",
+                               row[0].as<int64_t>(), row[1].as<int64_t>(), sql::Blob(record),
+                               sql::Checksum(key, record));
+      ++changed;
+    }
+  }
+  transaction.commit();
+  EXPECT_EQ(changed, 1);
+  AwaitSession(*older, name);
+  SessionCalls calls = CallsOf(*older);
+  EXPECT_EQ(calls.MeshBytes(name), mesh);
+  grpc::ClientContext context;
+  v1::AddVerticesRequest add;
+  add.set_name(name);
+  add.mutable_points()->Add(0.501);
+  add.mutable_points()->Add(0.499);
+  v1::AddVerticesResponse added;
+  const grpc::Status without = calls.queries().AddVertices(&context, add, &added);
+  EXPECT_EQ(without.error_code(), grpc::StatusCode::FAILED_PRECONDITION) << without.error_message();
+  EXPECT_EQ(calls.Refine(name).state(), v1::Operation::STATE_SUCCEEDED);
+  UseSession(*older, name, calls.MeshBytes(name), /*operations=*/2);
+}
+
 // A server with a folder of its own becomes one of several, and alone again.
 TEST_F(ReplicasTest, RecordsMoveToAndFro) {
   const auto move = [&](const std::vector<std::string>& arguments) {
@@ -294,73 +335,16 @@ TEST_F(ReplicasTest, ThePasswordIsNowhere) {
               AllOf(HasSubstr("--store"), Not(HasSubstr("cret"))));
 }
 
-// Two of them, each of which comes back where clients look for it.
-class MortalReplicas {
- public:
-  using Options = std::function<std::vector<std::string>(const std::string& name)>;
-
-  MortalReplicas(Options options, std::string errors) : options_(std::move(options)), errors_(std::move(errors)) {
-    for (size_t i = 0; i < kNames.size(); ++i) {
-      addresses_.push_back("127.0.0.1:0");
-      servers_.emplace_back();
-      Start(i);
-      addresses_[i] = servers_[i]->address();
-    }
-  }
-
-  const std::vector<std::string>& addresses() const { return addresses_; }
-
-  // A fault of one of them, or of the database.
-  void Suffer(int fault, size_t which) {
-    if (fault % 4 == 3) {
-      PostgresServer::OfThisProgram().Kill();
-      PostgresServer::OfThisProgram().Start();
-      return;
-    }
-    Subprocess& process = servers_[which]->process();
-    if (fault % 4 == 2) {
-      process.Signal(SIGSTOP);
-      std::this_thread::sleep_for(absl::ToChronoMilliseconds(kLease + absl::Seconds(2)));
-      process.Signal(SIGCONT);
-      std::this_thread::sleep_for(std::chrono::milliseconds(300));  // it answers those who have waited for it
-    }
-    process.Signal(fault % 4 == 0 ? SIGKILL : SIGTERM);
-    process.Wait();
-    Start(which);
-  }
-
-  void Stop() {
-    for (const auto& server : servers_) {
-      server->Stop();
-    }
-  }
-
- private:
-  static constexpr std::array<const char*, 2> kNames = {"first", "second"};
-
-  void Start(size_t i) {
-    std::vector<std::string> options = options_(kNames[i]);
-    options.insert(options.end(), {"--grace", "1", "--listen", addresses_[i]});
-    servers_[i] = std::make_unique<Daemon>(options, absl::StrCat(errors_, "/", kNames[i]), "", Daemon::Listen::kAsTold);
-  }
-
-  const Options options_;
-  const std::string errors_;
-  std::vector<std::string> addresses_;
-  std::vector<std::unique_ptr<Daemon>> servers_;
-};
-
 // Servers die, are drained and stand still, and the database is restarted, while clients go on: all that any server has
 // acknowledged is there, each request was done once.
 TEST_F(ReplicasTest, NothingIsLostAmongClientsThatGoOn) {
-  const uint32_t seed = std::random_device()();
-  SCOPED_TRACE(absl::StrCat("seed ", seed));
-  std::minstd_rand random(seed);
-  MortalReplicas replicas([this](const std::string& name) { return Options(name); }, errors_.path());
-  const Recorded recorded = RecordAmongFaults(replicas.addresses(), kClients, kFaults, [&](int i) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(200 + random() % 1000));
-    replicas.Suffer(i, random() % replicas.addresses().size());
-  });
+  std::vector<MortalReplicas::Place> places;
+  for (const std::string name : {"first", "second"}) {
+    places.push_back({.options = Options(name), .address = "127.0.0.1:0", .error_path = ErrorPath(name)});
+  }
+  MortalReplicas replicas(std::move(places), kLease, PostgresServer::OfThisProgram());
+  const Recorded recorded =
+      RecordAmongFaults(replicas.addresses(), kClients, kFaults, replicas.Faults(), replicas.size());
   replicas.Stop();
   RecordProperty("sessions", recorded.lives);
   RecordProperty("redirected", recorded.redirected);

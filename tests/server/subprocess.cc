@@ -15,16 +15,18 @@ extern char** environ;
 
 namespace wellspace::server {
 
+std::vector<std::string> AfterShell(const std::string& commands) {
+  return {"/bin/sh", "-c", commands + R"(; exec "$0" "$@")"};
+}
+
 Subprocess::Subprocess(const std::string& name, std::vector<std::string> arguments, const std::string& error_path,
-                       const std::string& limits) {
+                       std::vector<std::string> before) {
   const char* folder = std::getenv("WELLSPACE_BIN_DIR");
   if (folder == nullptr) {
     throw std::runtime_error("WELLSPACE_BIN_DIR is not set: run this test with ctest");
   }
   arguments.insert(arguments.begin(), name[0] == '/' ? name : std::string(folder) + "/" + name);
-  if (!limits.empty()) {
-    arguments.insert(arguments.begin(), {"/bin/sh", "-c", limits + R"(; exec "$0" "$@")"});
-  }
+  arguments.insert(arguments.begin(), before.begin(), before.end());
   const std::string program = arguments.front();
   std::vector<char*> argv;
   for (std::string& argument : arguments) {
@@ -86,6 +88,12 @@ int Subprocess::Wait() {
   waitpid(pid_, &state, 0);
   pid_ = -1;
   return WIFEXITED(state) ? WEXITSTATUS(state) : -WTERMSIG(state);
+}
+
+bool Subprocess::HasEnded() const {
+  siginfo_t ended{};
+  return pid_ <= 0 ||
+         (waitid(P_PID, static_cast<id_t>(pid_), &ended, WEXITED | WNOHANG | WNOWAIT) == 0 && ended.si_pid == pid_);
 }
 
 }  // namespace wellspace::server

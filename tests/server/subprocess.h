@@ -11,16 +11,20 @@
 
 namespace wellspace::server {
 
+// A command that runs a program behind it after `commands` of a shell, as "ulimit -n 64", a limit that the
+// program cannot raise.
+std::vector<std::string> AfterShell(const std::string& commands);
+
 // Killed with SIGKILL at the latest on destruction.
 //
 // Thread safety: thread-compatible.
 class Subprocess {
  public:
   // Starts WELLSPACE_BIN_DIR/`name`, or `name` itself if that is an absolute path. Its standard output is read here,
-  // its standard error is the test's, or goes to the file `error_path`. `limits`: commands of a shell before it, as
-  // "ulimit -n 64", whose limits it cannot raise.
+  // its standard error is the test's, or goes to the file `error_path`. `before`: a command in front of it, which
+  // becomes what stands behind it.
   Subprocess(const std::string& name, std::vector<std::string> arguments, const std::string& error_path = "",
-             const std::string& limits = "");
+             std::vector<std::string> before = {});
   ~Subprocess();
   Subprocess(const Subprocess&) = delete;
   Subprocess& operator=(const Subprocess&) = delete;
@@ -37,6 +41,8 @@ class Subprocess {
 
   // Waits for its end. Its exit code, or minus the signal that ended it.
   int Wait();
+  // Whether Wait would not have to wait.
+  bool HasEnded() const;
 
  private:
   pid_t pid_ = -1;

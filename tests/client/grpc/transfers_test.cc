@@ -395,10 +395,12 @@ TEST(Download, ReturnsTheMesh) {
 }
 
 TEST(Download, GoesOnAtTheNextChunkOfTheSameRevision) {
-  // The last is a status that a server sends ahead of a message that is not read: it has no details.
+  // The third is a status that a server sends ahead of a message that is not read: it has no details. The last is
+  // gRPC's own, where a proxy breaks off.
   for (const grpc::Status& end :
        {Broken(), MakeError(grpc::StatusCode::DEADLINE_EXCEEDED, "the reader stalled", "ERROR_REASON_READER_STALLED"),
-        grpc::Status(grpc::StatusCode::DEADLINE_EXCEEDED, "READER_STALLED: the client has not taken a message")}) {
+        grpc::Status(grpc::StatusCode::DEADLINE_EXCEEDED, "READER_STALLED: the client has not taken a message"),
+        grpc::Status(grpc::StatusCode::UNKNOWN, "Stream removed")}) {
     FakeServer server;
     FakeMesh mesh(server);
     mesh.breaks_before = 0;

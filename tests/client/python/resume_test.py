@@ -243,6 +243,18 @@ class ResumeTest(BreakerCase):
             self.client.info()
         self.assertEqual(self.breaker.count("GetServerInfo"), 12)
 
+    def test_what_a_proxy_breaks_off(self):
+        """gRPC has no better code for it than UNKNOWN."""
+
+        def break_off(name, call, message, data):
+            if call == 0:
+                raise Break(grpc.StatusCode.UNKNOWN, "Stream removed")
+            return data
+
+        self.breaker.on_answer = break_off
+        self.client.info()
+        self.assertEqual(self.breaker.count("GetServerInfo"), 2)
+
     def test_what_is_not_worth_it(self):
         def refuse(name, call, message, data):
             raise Break(grpc.StatusCode.INTERNAL)

@@ -3,6 +3,7 @@
 #include "server/store/postgres_records.h"
 
 #include <atomic>
+#include <latch>
 #include <memory>
 #include <pqxx/pqxx>
 #include <set>
@@ -18,6 +19,7 @@
 #include "server/store/back_up.h"
 #include "server/store/check_data.h"
 #include "server/store/durable_log.h"
+#include "server/store/postgres_schema.h"
 #include "tests/server/service_harness.h"
 #include "tests/server/store/cutting_proxy.h"
 #include "tests/server/store/postgres_server.h"
@@ -380,6 +382,86 @@ TEST_F(PostgresRecordsTest, ACommitInDoubtIsLookedUp) {
   EXPECT_TRUE(Update(*records, 1, records->epoch(), 4).ok());
   EXPECT_EQ(records->ReadRecord(SessionName(1)).value()->revision(), 4u);
   EXPECT_EQ(failures_, 0);
+}
+
+// The database crashes with the commit under way, and gives the numbers of transactions that it had given shortly
+// before to others: theirs is another outcome.
+TEST_F(PostgresRecordsTest, ACommitInDoubtIsLookedUpAfterACrash) {
+  PostgresLink link({.address = address_, .owner = "link", .look_up_for = absl::Seconds(20)}, PreparePostgres);
+  ASSERT_TRUE(OpenPostgresSchema(link).ok());
+  server_->Run("CREATE TABLE made(number integer); CHECKPOINT", database_);
+  for (const int others : {0, 20}) {
+    const absl::Status lost = link.Transact([&](pqxx::dbtransaction& transaction) {
+      transaction.exec0("INSERT INTO made VALUES(1)");
+      server_->Kill();
+      server_->Start();
+      for (int i = 0; i < others; ++i) {
+        server_->Run("INSERT INTO made VALUES(2)", database_);
+      }
+      return absl::OkStatus();
+    });
+    EXPECT_EQ(ReasonOf(lost), "STORE_FAILED") << lost;
+    EXPECT_THAT(std::string(lost.message()), HasSubstr("before it had made the change"));
+  }
+  int64_t made = -1;
+  EXPECT_TRUE(link.Read([&](pqxx::dbtransaction& transaction) {
+                    made = transaction.exec1("SELECT count(*) FROM made WHERE number = 1")[0].as<int64_t>();
+                    return absl::OkStatus();
+                  })
+                  .ok());
+  EXPECT_EQ(made, 0);
+}
+
+// A server stands still within a transaction: others do not wait until it goes on.
+TEST_F(PostgresRecordsTest, WhoStandsStillKeepsNoOneWaiting) {
+  const PostgresOptions options{.address = address_, .owner = "link", .look_up_for = kShort};
+  PostgresLink first(options, PreparePostgres);
+  PostgresLink second(options, PreparePostgres);
+  ASSERT_TRUE(OpenPostgresSchema(first).ok());
+  const auto lock_store = [](pqxx::dbtransaction& transaction) {
+    transaction.exec1("SELECT version FROM wellspace.store FOR UPDATE");
+    return absl::OkStatus();
+  };
+  std::latch is_locked(1);
+  std::latch is_over(1);
+  int attempts = 0;
+  std::jthread stands_still([&] {
+    EXPECT_TRUE(first
+                    .Transact([&](pqxx::dbtransaction& transaction) {
+                      if (++attempts == 1) {
+                        lock_store(transaction).IgnoreError();
+                        is_locked.count_down();
+                        is_over.wait();
+                      }
+                      return lock_store(transaction);
+                    })
+                    .ok())
+        << "it is made anew";
+  });
+  is_locked.wait();
+  EXPECT_TRUE(second.Transact(lock_store).ok());
+  is_over.count_down();
+  stands_still.join();
+  EXPECT_EQ(attempts, 2);
+}
+
+// How old an answer is, is decided by one clock: those of servers jump.
+TEST_F(PostgresRecordsTest, AnswersAreKeptByTheClockOfTheDatabase) {
+  const AnswerKey key{.tenant = "tenant", .request_id = "create 1"};
+  const auto take_over = [&](const std::string& from, const std::string& by) {
+    const auto other = Open(by).value();
+    const auto owner = Open(from).value();
+    server_->Run("UPDATE wellspace.owners SET lease_until = '-infinity' WHERE name = '" + from + "'", database_);
+    EXPECT_TRUE(other->TakeOrphans().ok());
+    return other->FindAnswer(key).value();
+  };
+  {
+    const auto records = Open("maker").value();
+    ASSERT_TRUE(Create(*records, 1, key.request_id).ok());
+  }
+  EXPECT_TRUE(take_over("first", "second").has_value()) << "its maker said that it was made in 2023";
+  server_->Run("UPDATE wellspace.answers SET time = time - interval '2 hours'", database_);
+  EXPECT_FALSE(take_over("third", "fourth").has_value());
 }
 
 // To the library of PostgreSQL, the end of a transaction that only reads is in doubt, too; here it is read again.

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
+#include <fstream>
 #include <pqxx/pqxx>
 #include <thread>
 #include <utility>
@@ -87,7 +88,8 @@ PostgresServer& PostgresServer::OfThisProgram() {
   return server;
 }
 
-PostgresServer::PostgresServer() {
+PostgresServer::PostgresServer(std::string host, std::vector<std::string> before)
+    : host_(std::move(host)), before_(std::move(before)) {
   if (geteuid() == 0) {
     EXPECT_EQ(chown(folder_.path().c_str(), User()->pw_uid, User()->pw_gid), 0);
   }
@@ -97,6 +99,7 @@ PostgresServer::PostgresServer() {
                           log)),
             0);
   fs::remove(log);
+  std::ofstream(folder_.path() + "/data/pg_hba.conf", std::ios::app) << "host all all 10.0.0.0/8 trust\n";
   port_ = FreePort();
   Start();
 }
@@ -112,19 +115,19 @@ PostgresServer::~PostgresServer() {
 // Root gives its rights away first.
 std::vector<std::string> PostgresServer::AsUser(std::vector<std::string> command) const {
   if (geteuid() != 0) {
-    return command;
+    return command;  // `before` is root's
   }
-  std::vector<std::string> whole = {"setpriv",        absl::StrCat("--reuid=", User()->pw_uid),
-                                    "--clear-groups", absl::StrCat("--regid=", User()->pw_gid),
-                                    "--pdeathsig",    "INT"};
+  std::vector<std::string> whole = before_;
+  whole.insert(whole.end(), {"setpriv", absl::StrCat("--reuid=", User()->pw_uid), "--clear-groups",
+                             absl::StrCat("--regid=", User()->pw_gid), "--pdeathsig", "INT"});
   whole.insert(whole.end(), command.begin(), command.end());
   return whole;
 }
 
 void PostgresServer::Start() {
   ASSERT_LE(pid_, 0);
-  pid_ = Spawn(AsUser({Programs() + "/postgres", "-D", folder_.path() + "/data", "-h", "127.0.0.1", "-p",
-                       absl::StrCat(port_), "-k", folder_.path(), "-c", "fsync=off", "-c", "shared_buffers=16MB"}),
+  pid_ = Spawn(AsUser({Programs() + "/postgres", "-D", folder_.path() + "/data", "-h", host_, "-p", absl::StrCat(port_),
+                       "-k", folder_.path(), "-c", "fsync=off", "-c", "shared_buffers=16MB"}),
                folder_.path() + "-server.log");
   for (int attempt = 0; attempt < 600; ++attempt) {
     try {
@@ -144,7 +147,7 @@ void PostgresServer::Kill() {
 }
 
 std::string PostgresServer::AddressOf(const std::string& database, const std::string& role) const {
-  return absl::StrCat("postgresql://", role, "@127.0.0.1:", port_, "/", database);
+  return absl::StrCat("postgresql://", role, "@", host_, ":", port_, "/", database);
 }
 
 std::string PostgresServer::NewDatabase() {

@@ -1,4 +1,4 @@
-// A PostgreSQL of the test's own: Debian's programs, a folder that goes away, a free port of the loopback.
+// A PostgreSQL of the test's own: Debian's programs, a folder that goes away, a free port.
 #ifndef WELLSPACE_TESTS_SERVER_STORE_POSTGRES_SERVER_H_
 #define WELLSPACE_TESTS_SERVER_STORE_POSTGRES_SERVER_H_
 
@@ -24,8 +24,10 @@ class PostgresServer {
   // Why there can be none; empty: there can.
   static std::string WhyNot();
 
+  // It listens at `host`, where a command runs that has `before` in front of it.
+  //
   // REQUIRES:   WhyNot() is empty.
-  PostgresServer();
+  explicit PostgresServer(std::string host = "127.0.0.1", std::vector<std::string> before = {});
   ~PostgresServer();
   PostgresServer(const PostgresServer&) = delete;
   PostgresServer& operator=(const PostgresServer&) = delete;
@@ -47,6 +49,8 @@ class PostgresServer {
  private:
   std::vector<std::string> AsUser(std::vector<std::string> command) const;
 
+  const std::string host_;
+  const std::vector<std::string> before_;
   const TestFolder folder_;
   int port_ = 0;
   pid_t pid_ = -1;  // -1: it does not run

@@ -223,6 +223,8 @@ class Calls:
                 details = value
         if code == "UNAVAILABLE" and not details and "handshake failed" in message.lower():
             return CredentialsError(f"the server's certificate is not trusted, or it speaks no TLS: {message}")
+        if code == "UNKNOWN" and not details and message == "Stream removed":  # a proxy broke off between two messages
+            code, message = "UNAVAILABLE", f"the connection broke off: {message}"
         if code == "UNAVAILABLE" and not details:
             message = _in_plain_words(message, self._link.place)
         return from_status(code, message, details)
