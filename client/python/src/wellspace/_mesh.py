@@ -204,8 +204,9 @@ class Mesh(MeshArrays):
         """Writes the mesh to a file; the extension says in which format.
 
         ``.npz`` needs nothing else. ``.vtu``, ``.vtkhdf``, ``.vtk``, ``.xdmf``, ``.msh``, ``.mesh``, ``.su2``,
-        ``.inp``, ``.node``, ``.14`` and ``.2dm`` are written by the tool `wellspace`, on the path or named by
-        ``$WELLSPACE_TOOL_BINARY``: the bytes of ``wellspace convert``, with names of parts and regions.
+        ``.inp``, ``.node``, ``.14`` and ``.2dm`` are written by the tool `wellspace`, that of
+        ``$WELLSPACE_TOOL_BINARY``, of the wheel or on the path: the bytes of
+        ``wellspace convert``, with names of parts and regions.
         Other formats, those without the tool, and all with `options`, are those of `meshio.write`, in 2-D and 3-D.
 
         With ``order=2`` elements are of second order (`to_order`): ``.npz``, which has the arrays of `SecondOrderMesh`,
