@@ -33,6 +33,8 @@ wellspace_package(RUNTIME wellspace math "quality meshes of point clouds and pla
 "Wellspace makes meshes of triangles and tetrahedra of quality from clouds of
 points and planar domains, and simplices up to 6-D. This is the command line
 tool, which meshes by itself or by a server, and checks and draws meshes.")
+# Cairo is loaded by its name, where dpkg-shlibdeps does not see it.
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS "libcairo2 (>= 1.16)")
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SUGGESTS wellspaced)
 
 wellspace_package(SERVER wellspaced math "quality meshes of point clouds and planar domains (server)"

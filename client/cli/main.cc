@@ -1,14 +1,20 @@
 // wellspace: meshes of point clouds and of domains in the plane and in space from the command line.
+//
+//     wellspace wellspaced ARGUMENTS
+// is the server, `wellspaced ARGUMENTS`: in a wheel the two programs are one file, which is as large as the tool alone.
 #include <CLI/CLI.hpp>
 #include <csignal>
 #include <cstdlib>
 #include <iostream>
 #include <new>
+#include <string>
+#include <string_view>
 
 #include "client/cli/commands/commands.h"
 #include "client/cli/exit_codes.h"
 #include "client/cli/standard_output.h"
 #include "client/cli/usage.h"
+#include "server/wellspaced.h"
 
 // Libraries open descriptors when they are loaded: this runs before them.
 [[gnu::section(".preinit_array"),
@@ -16,6 +22,9 @@
 
 int main(int argc, char** argv) {
   using namespace wellspace::cli;
+  if (argc > 1 && std::string_view(argv[1]) == "wellspaced") {
+    return wellspace::server::RunWellspaced(argc - 1, argv + 1);
+  }
   std::signal(SIGPIPE, SIG_IGN);                      // a closed pipe is an error of writing, which is reported,
   std::signal(SIGXFSZ, SIG_IGN);                      // and so is the limit of a file's size
   setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);  // errors of connections are told by the commands

@@ -121,8 +121,8 @@ void ParameterOptions::AddSpaceTo(CLI::App& command) {
   AddPeriodic(
       command, options_.periodic_axes,
       "Axes along which the box is periodic, as x or x,y: for each vertex on one of two opposite sides there is "
-      "one on the other, and the facets on both match; in 2-D and 3-D, for points without segments or "
-      "triangles; default: none");
+      "one on the other, and the facets on both match; in 2-D and 3-D, for points without triangles; with segments "
+      "the sides of their bounding rectangle have the same segments; default: none");
 }
 
 void ParameterOptions::AddQualityTo(CLI::App& command) {

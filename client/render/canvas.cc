@@ -1,11 +1,9 @@
 #include "client/render/canvas.h"
 
-#include <cairo-pdf.h>
-#include <cairo-svg.h>
-
 #include "absl/strings/str_cat.h"
 #include "client/formats/io/number.h"
 #include "client/formats/registry.h"
+#include "client/render/cairo_library.h"
 #include "client/render/picture_format.h"
 
 namespace wellspace::render {
@@ -22,19 +20,19 @@ cairo_status_t WriteToFile(void* closure, const unsigned char* data, unsigned in
 }  // namespace
 
 void SetColour(cairo_t* cairo, const Colour& colour, double alpha) {
-  cairo_set_source_rgba(cairo, colour.red, colour.green, colour.blue, alpha);
+  Cairo().set_source_rgba(cairo, colour.red, colour.green, colour.blue, alpha);
 }
 
 void PaintBackground(cairo_t* cairo) {
-  cairo_set_source_rgb(cairo, 1, 1, 1);
-  cairo_paint(cairo);
+  Cairo().set_source_rgb(cairo, 1, 1, 1);
+  Cairo().paint(cairo);
 }
 
 void PaintText(cairo_t* cairo, double x, double y, const std::string& text) {
   cairo_font_extents_t extents;
-  cairo_font_extents(cairo, &extents);
-  cairo_move_to(cairo, x, y + (extents.ascent - extents.descent) / 2);
-  cairo_show_text(cairo, text.c_str());
+  Cairo().font_extents(cairo, &extents);
+  Cairo().move_to(cairo, x, y + (extents.ascent - extents.descent) / 2);
+  Cairo().show_text(cairo, text.c_str());
 }
 
 absl::Status CairoError(cairo_status_t status, const OutputFile& file) {
@@ -47,30 +45,30 @@ absl::Status CairoError(cairo_status_t status, const OutputFile& file) {
     case CAIRO_STATUS_NO_MEMORY:
       return absl::ResourceExhaustedError("not enough memory for the picture; expected a smaller width");
     default:
-      return absl::InternalError(absl::StrCat("Cairo: ", cairo_status_to_string(status)));
+      return absl::InternalError(absl::StrCat("Cairo: ", Cairo().status_to_string(status)));
   }
 }
 
 absl::Status WriteAsPng(cairo_surface_t* image, OutputFile& file) {
-  return CairoError(cairo_surface_write_to_png_stream(image, WriteToFile, &file), file);
+  return CairoError(Cairo().surface_write_to_png_stream(image, WriteToFile, &file), file);
 }
 
 absl::Status PaintAsVectors(PictureFormat format, double width, double height,
                             const std::function<void(cairo_t*)>& paint, OutputFile& file) {
   const bool is_pdf = format == PictureFormat::kPdf;
-  const Surface picture(is_pdf ? cairo_pdf_surface_create_for_stream(WriteToFile, &file, width, height)
-                               : cairo_svg_surface_create_for_stream(WriteToFile, &file, width, height));
+  const Surface picture(is_pdf ? Cairo().pdf_surface_create_for_stream(WriteToFile, &file, width, height)
+                               : Cairo().svg_surface_create_for_stream(WriteToFile, &file, width, height));
   if (is_pdf) {
-    cairo_pdf_surface_set_metadata(picture.get(), CAIRO_PDF_METADATA_CREATE_DATE, "");  // the same bits at any time
+    Cairo().pdf_surface_set_metadata(picture.get(), CAIRO_PDF_METADATA_CREATE_DATE, "");  // the same bits at any time
   } else {
-    cairo_svg_surface_set_document_unit(picture.get(), CAIRO_SVG_UNIT_PX);
+    Cairo().svg_surface_set_document_unit(picture.get(), CAIRO_SVG_UNIT_PX);
   }
-  const Canvas canvas(cairo_create(picture.get()));
+  const Canvas canvas(Cairo().create(picture.get()));
   PaintBackground(canvas.get());
   paint(canvas.get());
-  const cairo_status_t painted = cairo_status(canvas.get());
-  cairo_surface_finish(picture.get());
-  return CairoError(painted != CAIRO_STATUS_SUCCESS ? painted : cairo_surface_status(picture.get()), file);
+  const cairo_status_t painted = Cairo().status(canvas.get());
+  Cairo().surface_finish(picture.get());
+  return CairoError(painted != CAIRO_STATUS_SUCCESS ? painted : Cairo().surface_status(picture.get()), file);
 }
 
 absl::StatusOr<PictureFormat> PictureFormatOf(const std::string& path) {

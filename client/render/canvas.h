@@ -2,22 +2,21 @@
 #ifndef WELLSPACE_CLIENT_RENDER_CANVAS_H_
 #define WELLSPACE_CLIENT_RENDER_CANVAS_H_
 
-#include <cairo.h>
-
 #include <functional>
 #include <memory>
 #include <string>
 
 #include "absl/status/status.h"
 #include "client/formats/io/output_file.h"
+#include "client/render/cairo_library.h"
 #include "client/render/colour_ramp.h"
 #include "client/render/picture_format.h"
 
 namespace wellspace::render {
 
 struct DestroyCairo {
-  void operator()(cairo_surface_t* surface) const { cairo_surface_destroy(surface); }
-  void operator()(cairo_t* cairo) const { cairo_destroy(cairo); }
+  void operator()(cairo_surface_t* surface) const { Cairo().surface_destroy(surface); }
+  void operator()(cairo_t* cairo) const { Cairo().destroy(cairo); }
 };
 using Surface = std::unique_ptr<cairo_surface_t, DestroyCairo>;
 using Canvas = std::unique_ptr<cairo_t, DestroyCairo>;

@@ -1,12 +1,11 @@
 #include "client/render/histograms.h"
 
-#include <cairo.h>
-
 #include <algorithm>
 #include <cmath>
 
 #include "absl/strings/str_format.h"
 #include "client/formats/io/output_file.h"
+#include "client/render/cairo_library.h"
 #include "client/render/canvas.h"
 #include "client/render/colour_ramp.h"
 #include "core/base/status_macros.h"
@@ -43,19 +42,19 @@ struct Panel {
 // Text centred at x, or with its right end there.
 void PaintTextAt(cairo_t* cairo, double x, double y, const std::string& text, double share) {
   cairo_text_extents_t extents;
-  cairo_text_extents(cairo, text.c_str(), &extents);
+  Cairo().text_extents(cairo, text.c_str(), &extents);
   PaintText(cairo, x - share * extents.x_advance, y, text);
 }
 
 void PaintLine(cairo_t* cairo, double x, double y, double to_x, double to_y) {
-  cairo_move_to(cairo, x, y);
-  cairo_line_to(cairo, to_x, to_y);
-  cairo_stroke(cairo);
+  Cairo().move_to(cairo, x, y);
+  Cairo().line_to(cairo, to_x, to_y);
+  Cairo().stroke(cairo);
 }
 
 void PaintAxes(cairo_t* cairo, const Histogram& histogram, const Panel& panel) {
   SetColour(cairo, kInk);
-  cairo_set_line_width(cairo, 1);
+  Cairo().set_line_width(cairo, 1);
   PaintLine(cairo, panel.left, panel.bottom, panel.right, panel.bottom);
   PaintLine(cairo, panel.left, panel.bottom, panel.left, panel.top);
   PaintTextAt(cairo, (panel.left + panel.right) / 2, panel.top - 1.4 * kFontSize, histogram.title, 0.5);
@@ -78,15 +77,15 @@ void PaintBars(cairo_t* cairo, const Histogram& histogram, const Panel& panel) {
   for (size_t i = 0; i < histogram.counts.size(); ++i) {
     if (histogram.counts[i] > 0) {
       const double height = panel.HeightOf(static_cast<double>(histogram.counts[i]));
-      cairo_rectangle(cairo, panel.left + width * static_cast<double>(i), panel.bottom - height, width, height);
-      cairo_fill(cairo);
+      Cairo().rectangle(cairo, panel.left + width * static_cast<double>(i), panel.bottom - height, width, height);
+      Cairo().fill(cairo);
     }
   }
 }
 
 void PaintAll(cairo_t* cairo, const std::vector<Histogram>& histograms, const std::string& caption) {
-  cairo_select_font_face(cairo, "sans-serif", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
-  cairo_set_font_size(cairo, kFontSize);
+  Cairo().select_font_face(cairo, "sans-serif", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
+  Cairo().set_font_size(cairo, kFontSize);
   SetColour(cairo, kInk);
   PaintText(cairo, kLeft, 2 * kFontSize, caption);
   // One scale for all.
@@ -113,6 +112,7 @@ void PaintAll(cairo_t* cairo, const std::vector<Histogram>& histograms, const st
 
 absl::Status WriteHistograms(const std::vector<Histogram>& histograms, const std::string& caption, PictureFormat format,
                              const std::string& path) {
+  WELLSPACE_RETURN_IF_ERROR(LoadCairo());
   WELLSPACE_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path));
   const int width = kPanelWidth * static_cast<int>(histograms.size());
   absl::Status status;
@@ -120,11 +120,11 @@ absl::Status WriteHistograms(const std::vector<Histogram>& histograms, const std
     status = PaintAsVectors(
         format, width, kHeight, [&](cairo_t* cairo) { PaintAll(cairo, histograms, caption); }, file);
   } else {
-    const Surface picture(cairo_image_surface_create(CAIRO_FORMAT_RGB24, width, kHeight));
-    const Canvas canvas(cairo_create(picture.get()));
+    const Surface picture(Cairo().image_surface_create(CAIRO_FORMAT_RGB24, width, kHeight));
+    const Canvas canvas(Cairo().create(picture.get()));
     PaintBackground(canvas.get());
     PaintAll(canvas.get(), histograms, caption);
-    const cairo_status_t painted = cairo_status(canvas.get());
+    const cairo_status_t painted = Cairo().status(canvas.get());
     status = painted == CAIRO_STATUS_SUCCESS ? WriteAsPng(picture.get(), file) : CairoError(painted, file);
   }
   return status.ok() ? file.Commit() : status;

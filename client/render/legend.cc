@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "client/render/cairo_library.h"
 #include "client/render/canvas.h"
 #include "client/render/colour_ramp.h"
 
@@ -28,29 +29,29 @@ std::string Shortened(const std::string& name) {
 void PaintRamp(cairo_t* cairo, const Scene& scene, const Layout& layout) {
   const double bottom = layout.legend_top + layout.legend_height;
   constexpr int kSteps = 128;
-  cairo_set_antialias(cairo, CAIRO_ANTIALIAS_NONE);
+  Cairo().set_antialias(cairo, CAIRO_ANTIALIAS_NONE);
   for (int step = 0; step < kSteps; ++step) {
     const double from = bottom - layout.legend_height * (step + 1) / kSteps;
     SetColour(cairo, RampColour((step + 0.5) / kSteps));
     // A pixel more, under the next step, so that no seam is left.
-    cairo_rectangle(cairo, layout.legend_left, from, layout.legend_width, layout.legend_height / kSteps + 1);
-    cairo_fill(cairo);
+    Cairo().rectangle(cairo, layout.legend_left, from, layout.legend_width, layout.legend_height / kSteps + 1);
+    Cairo().fill(cairo);
   }
-  cairo_set_antialias(cairo, CAIRO_ANTIALIAS_DEFAULT);
+  Cairo().set_antialias(cairo, CAIRO_ANTIALIAS_DEFAULT);
   SetColour(cairo, kInk);
-  cairo_set_line_width(cairo, 1);
-  cairo_rectangle(cairo, layout.legend_left, layout.legend_top, layout.legend_width, layout.legend_height);
-  cairo_stroke(cairo);
+  Cairo().set_line_width(cairo, 1);
+  Cairo().rectangle(cairo, layout.legend_left, layout.legend_top, layout.legend_width, layout.legend_height);
+  Cairo().stroke(cairo);
 
-  cairo_select_font_face(cairo, "sans-serif", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
-  cairo_set_font_size(cairo, layout.font_size);
+  Cairo().select_font_face(cairo, "sans-serif", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
+  Cairo().set_font_size(cairo, layout.font_size);
   const double right = layout.legend_left + layout.legend_width;
   const double tick = 0.35 * layout.font_size;
   const auto mark = [&](double share, const std::string& text) {
     const double y = bottom - layout.legend_height * share;
-    cairo_move_to(cairo, right, y);
-    cairo_line_to(cairo, right + tick, y);
-    cairo_stroke(cairo);
+    Cairo().move_to(cairo, right, y);
+    Cairo().line_to(cairo, right + tick, y);
+    Cairo().stroke(cairo);
     PaintText(cairo, right + 2 * tick, y, text);
   };
   constexpr int kDegreesPerTick = 10;
@@ -85,13 +86,13 @@ void PaintCategories(cairo_t* cairo, const Scene& scene, const Layout& layout) {
   const auto rows = static_cast<size_t>((layout.height - 2 * layout.margin) / row);
   const bool all_fit = scene.categories.size() <= rows;
   const size_t named = all_fit ? scene.categories.size() : rows - 1;
-  cairo_select_font_face(cairo, "sans-serif", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
-  cairo_set_font_size(cairo, layout.font_size);
+  Cairo().select_font_face(cairo, "sans-serif", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
+  Cairo().set_font_size(cairo, layout.font_size);
   double y = (layout.height - static_cast<double>(all_fit ? named : rows) * row) / 2 + row / 2;
   for (size_t i = 0; i < named; ++i, y += row) {
     SetColour(cairo, CategoryColour(i));
-    cairo_rectangle(cairo, layout.legend_left, y - layout.font_size / 2, layout.font_size, layout.font_size);
-    cairo_fill(cairo);
+    Cairo().rectangle(cairo, layout.legend_left, y - layout.font_size / 2, layout.font_size, layout.font_size);
+    Cairo().fill(cairo);
     SetColour(cairo, kInk);
     PaintText(cairo, layout.legend_left + 1.5 * layout.font_size, y, Shortened(scene.categories[i]));
   }

@@ -2,8 +2,7 @@
 #ifndef WELLSPACE_CLIENT_RENDER_LEGEND_H_
 #define WELLSPACE_CLIENT_RENDER_LEGEND_H_
 
-#include <cairo.h>
-
+#include "client/render/cairo_library.h"
 #include "client/render/layout.h"
 #include "client/render/scene.h"
 

@@ -1,7 +1,5 @@
 #include "client/render/painter.h"
 
-#include <cairo.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,6 +7,7 @@
 #include <string>
 
 #include "client/formats/io/output_file.h"
+#include "client/render/cairo_library.h"
 #include "client/render/canvas.h"
 #include "client/render/colour_ramp.h"
 #include "client/render/layout.h"
@@ -33,12 +32,12 @@ void PaintDots(cairo_t* cairo, const Facet& facet, const Layout& layout) {
   constexpr double kFullTurn = 6.283185307179586;
   for (int i = 0; i < 3; ++i) {
     if (facet.has_dot[i]) {
-      cairo_new_sub_path(cairo);
-      cairo_arc(cairo, layout.X(facet.corners[i]), layout.Y(facet.corners[i]), kRadius, 0, kFullTurn);
+      Cairo().new_sub_path(cairo);
+      Cairo().arc(cairo, layout.X(facet.corners[i]), layout.Y(facet.corners[i]), kRadius, 0, kFullTurn);
     }
   }
   SetColour(cairo, {0.08, 0.08, 0.10});
-  cairo_fill(cairo);
+  Cairo().fill(cairo);
 }
 
 // Fills the triangles and draws their edges, which fade as the triangles get too small to show them.
@@ -46,8 +45,8 @@ void PaintFacets(cairo_t* cairo, const Scene& scene, const Layout& layout, bool 
   constexpr double kInvisible = 1.2;  // pixels that a triangle is high
   constexpr double kClear = 9;
   constexpr double kLineWidth = 0.7;
-  cairo_set_line_join(cairo, CAIRO_LINE_JOIN_ROUND);
-  cairo_set_line_width(cairo, kLineWidth);
+  Cairo().set_line_join(cairo, CAIRO_LINE_JOIN_ROUND);
+  Cairo().set_line_width(cairo, kLineWidth);
   for (const Facet& facet : scene.facets) {
     double x[3];
     double y[3];
@@ -63,21 +62,21 @@ void PaintFacets(cairo_t* cairo, const Scene& scene, const Layout& layout, bool 
     const double height = longest > 0 ? twice_area / longest : 0;
     const Colour colour =
         Shaded(scene.categories.empty() ? ValueColour(facet.share) : CategoryColour(facet.category), facet.shade);
-    cairo_move_to(cairo, x[0], y[0]);
-    cairo_line_to(cairo, x[1], y[1]);
-    cairo_line_to(cairo, x[2], y[2]);
-    cairo_close_path(cairo);
+    Cairo().move_to(cairo, x[0], y[0]);
+    Cairo().line_to(cairo, x[1], y[1]);
+    Cairo().line_to(cairo, x[2], y[2]);
+    Cairo().close_path(cairo);
     SetColour(cairo, colour);
     const bool edges_show = longest > kClear && height > kInvisible;
     if (!edges_show && !stroke_small) {
-      cairo_fill(cairo);
+      Cairo().fill(cairo);
     } else {
-      cairo_fill_preserve(cairo);
+      Cairo().fill_preserve(cairo);
       if (edges_show) {
         const double strength = std::clamp((height - kInvisible) / (kClear - kInvisible), 0.0, 1.0);
         SetColour(cairo, Shaded(colour, 0.35), 0.15 + 0.55 * strength);
       }
-      cairo_stroke(cairo);
+      Cairo().stroke(cairo);
     }
     PaintDots(cairo, facet, layout);
   }
@@ -88,26 +87,26 @@ void PaintBoundary(cairo_t* cairo, const Scene& scene, const Layout& layout) {
   constexpr double kLineWidth = 1.6;
   const Colour ink = {0.08, 0.08, 0.10};
   SetColour(cairo, ink);
-  cairo_set_line_cap(cairo, CAIRO_LINE_CAP_ROUND);
-  cairo_set_line_width(cairo, kLineWidth);
+  Cairo().set_line_cap(cairo, CAIRO_LINE_CAP_ROUND);
+  Cairo().set_line_width(cairo, kLineWidth);
   for (const std::array<PicturePoint, 2>& line : scene.boundary) {
-    cairo_move_to(cairo, layout.X(line[0]), layout.Y(line[0]));
-    cairo_line_to(cairo, layout.X(line[1]), layout.Y(line[1]));
-    cairo_stroke(cairo);
+    Cairo().move_to(cairo, layout.X(line[0]), layout.Y(line[0]));
+    Cairo().line_to(cairo, layout.X(line[1]), layout.Y(line[1]));
+    Cairo().stroke(cairo);
   }
 }
 
 // Averages squares of kSupersampling x kSupersampling pixels. Both images are CAIRO_FORMAT_RGB24.
 void Average(cairo_surface_t* large, cairo_surface_t* small) {
-  cairo_surface_flush(large);
-  cairo_surface_flush(small);
-  const uint8_t* from = cairo_image_surface_get_data(large);
-  uint8_t* to = cairo_image_surface_get_data(small);
-  const int from_stride = cairo_image_surface_get_stride(large);
-  const int to_stride = cairo_image_surface_get_stride(small);
+  Cairo().surface_flush(large);
+  Cairo().surface_flush(small);
+  const uint8_t* from = Cairo().image_surface_get_data(large);
+  uint8_t* to = Cairo().image_surface_get_data(small);
+  const int from_stride = Cairo().image_surface_get_stride(large);
+  const int to_stride = Cairo().image_surface_get_stride(small);
   constexpr int kChannels = 4;
-  for (int y = 0; y < cairo_image_surface_get_height(small); ++y) {
-    for (int x = 0; x < cairo_image_surface_get_width(small) * kChannels; ++x) {
+  for (int y = 0; y < Cairo().image_surface_get_height(small); ++y) {
+    for (int x = 0; x < Cairo().image_surface_get_width(small) * kChannels; ++x) {
       int sum = 0;
       for (int dy = 0; dy < kSupersampling; ++dy) {
         for (int dx = 0; dx < kSupersampling; ++dx) {
@@ -119,24 +118,24 @@ void Average(cairo_surface_t* large, cairo_surface_t* small) {
       to[static_cast<ptrdiff_t>(y) * to_stride + x] = static_cast<uint8_t>((sum + kSamples / 2) / kSamples);
     }
   }
-  cairo_surface_mark_dirty(small);
+  Cairo().surface_mark_dirty(small);
 }
 
 absl::Status WritePng(const Scene& scene, const Layout& layout, OutputFile& file) {
   const int width = static_cast<int>(layout.width);
   const int height = static_cast<int>(layout.height);
-  const Surface picture(cairo_image_surface_create(CAIRO_FORMAT_RGB24, width, height));
-  const Canvas canvas(cairo_create(picture.get()));
+  const Surface picture(Cairo().image_surface_create(CAIRO_FORMAT_RGB24, width, height));
+  const Canvas canvas(Cairo().create(picture.get()));
   {
     const Surface large(
-        cairo_image_surface_create(CAIRO_FORMAT_RGB24, width * kSupersampling, height * kSupersampling));
-    const Canvas painting(cairo_create(large.get()));
+        Cairo().image_surface_create(CAIRO_FORMAT_RGB24, width * kSupersampling, height * kSupersampling));
+    const Canvas painting(Cairo().create(large.get()));
     PaintBackground(painting.get());
-    cairo_scale(painting.get(), kSupersampling, kSupersampling);
-    cairo_set_antialias(painting.get(), CAIRO_ANTIALIAS_NONE);
+    Cairo().scale(painting.get(), kSupersampling, kSupersampling);
+    Cairo().set_antialias(painting.get(), CAIRO_ANTIALIAS_NONE);
     PaintFacets(painting.get(), scene, layout, /*stroke_small=*/false);
     PaintBoundary(painting.get(), scene, layout);
-    for (const cairo_status_t status : {cairo_status(painting.get()), cairo_status(canvas.get())}) {
+    for (const cairo_status_t status : {Cairo().status(painting.get()), Cairo().status(canvas.get())}) {
       if (status != CAIRO_STATUS_SUCCESS) {
         return CairoError(status, file);
       }
@@ -161,6 +160,7 @@ absl::Status WriteVectors(const Scene& scene, const Layout& layout, PictureForma
 }  // namespace
 
 absl::Status WritePicture(const Scene& scene, int width, PictureFormat format, const std::string& path) {
+  WELLSPACE_RETURN_IF_ERROR(LoadCairo());
   WELLSPACE_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path));
   const Layout layout = MakeLayout(scene, width);
   const absl::Status painted =

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/base/status_macros.h"
+#include "core/features/periodic_sides.h"
 #include "core/features/planar_faces.h"
 #include "core/features/planar_graph.h"
 #include "core/input/near_points.h"
@@ -84,7 +85,7 @@ uint64_t DomainCloudBytes(uint64_t points, uint64_t segments, uint64_t seeds) {
 
 absl::StatusOr<DomainCloud> MakeDomainCloud(std::span<const double> points, const Features& features, const Box<2>& box,
                                             double merge_distance, uint64_t max_vertices, int threads,
-                                            const RunContext& context) {
+                                            const RunContext& context, std::span<const int> periodic_axes) {
   const bool is_in_box = features.faces == FaceRule::kBox;
   if (is_in_box && merge_distance == 0) {
     WELLSPACE_ASSIGN_OR_RETURN(const Frame<2> given, Frame<2>::Of(box));
@@ -122,14 +123,16 @@ absl::StatusOr<DomainCloud> MakeDomainCloud(std::span<const double> points, cons
   meshed.coordinates = {};  // the cloud has them
   meshed.names = {};
   const HugeVector<uint32_t> sorted_of = cloud.SortedOfInputs();
+  WELLSPACE_RETURN_IF_ERROR(KeepMeshed(sorted_of, graph, faces, context));
+  WELLSPACE_ASSIGN_OR_RETURN(PeriodicSides sides, PeriodicSides::Find(graph, periodic_axes, context));
   for (Point<2>& p : graph.points) {
     p = frame.Scaled(p);
   }
   for (Face& face : faces.faces) {
     face.max_area *= frame.scale * frame.scale;
   }
-  WELLSPACE_RETURN_IF_ERROR(KeepMeshed(sorted_of, graph, faces, context));
-  return DomainCloud{frame, std::move(cloud), std::make_unique<PlanarDomain>(std::move(graph), std::move(faces)),
+  return DomainCloud{frame, std::move(cloud),
+                     std::make_unique<PlanarDomain>(std::move(graph), std::move(faces), std::move(sides)),
                      meshed.dropped};
 }
 

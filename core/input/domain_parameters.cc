@@ -13,11 +13,6 @@ absl::Status ValidateDomainParameters(const MeshParameters& parameters, const Fe
     return absl::InvalidArgumentError(
         absl::StrCat("dimension: segments bound domains in 2-D alone, and it is ", parameters.dimension));
   }
-  if (!parameters.periodic_axes.empty()) {
-    return absl::InvalidArgumentError(
-        "periodic_axes: a domain with segments is not periodic; a box of points alone is; leave them out, in a session "
-        "of its own");
-  }
   if (parameters.criterion != Criterion::kRadiusEdge) {
     return absl::InvalidArgumentError("criterion: a domain with segments has the radius-edge criterion alone");
   }

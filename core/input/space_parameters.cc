@@ -19,8 +19,8 @@ absl::Status ValidateSpaceParameters(const MeshParameters& parameters, const Sur
   }
   if (!parameters.periodic_axes.empty()) {
     return absl::InvalidArgumentError(
-        "periodic_axes: a domain with a surface is not periodic; a box of points alone is; leave them out, in a "
-        "session of its own");
+        "periodic_axes: a domain with a surface is not periodic; a box of points, and a domain in the plane, can be; "
+        "leave them out, in a session of its own");
   }
   if (parameters.criterion != Criterion::kRadiusEdge) {
     return absl::InvalidArgumentError("criterion: a domain with a surface has the radius-edge criterion alone");

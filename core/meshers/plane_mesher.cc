@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <utility>
 
@@ -68,7 +69,8 @@ absl::Status PlaneMesher::CheckInput(const Input& input) const { return CheckSha
 
 uint64_t PlaneMesher::BuildingBytes(const MeshParameters& parameters, const Input& input) const {
   return (parameters.merge_distance > 0 ? input.points.size() / 2 * kMergeBytes<2> : 0) +
-         DomainCloudBytes(input.points.size() / 2, input.features->segment_count(), input.features->seeds.size());
+         DomainCloudBytes(input.points.size() / 2, input.features->segment_count(), input.features->seeds.size()) +
+         (parameters.periodic_axes.empty() ? 0 : PeriodicSides::BytesFor(input.features->segment_count()));
 }
 
 absl::Status PlaneMesher::Build(const MeshParameters& parameters, const Input& input, RunContext& context) {
@@ -82,7 +84,8 @@ absl::Status PlaneMesher::Build(const MeshParameters& parameters, const Input& i
     }
   }
   WELLSPACE_ASSIGN_OR_RETURN(DomainCloud made, MakeDomainCloud(input.points, features, box, parameters.merge_distance,
-                                                               VertexBudget(parameters), parameters.threads, context));
+                                                               VertexBudget(parameters), parameters.threads, context,
+                                                               parameters.periodic_axes));
   frame_ = made.frame;
   planar_ = std::move(made.planar);
   least_area_ = LeastAreaOf(*planar_, features.seeds, frame_.scale);
@@ -231,28 +234,48 @@ absl::StatusOr<std::vector<PlaneMesher::Subsegment>> PlaneMesher::EncroachedSubs
   return encroached;
 }
 
-// Splits each subsegment in its middle.
+// Splits each subsegment in its middle, and its image with it.
 absl::Status PlaneMesher::Split(std::span<const Subsegment> subsegments, const MeshParameters& parameters,
                                 const RunContext& context) {
+  std::map<uint32_t, std::vector<double>> split_by_image;  // by segment: distances from its end a
   for (const Subsegment& subsegment : subsegments) {
     WELLSPACE_RETURN_IF_ERROR(context.Check());
-    const SegmentPoint place = planar_->MiddleOf(subsegment.segment, subsegment.from, subsegment.to);
-    const Point<2> position = planar_->PositionOf(place);
-    const Neighbor nearest = structure_.NearestTo(position, subsegment.from, workspace_);
-    if (structure_.vertex_count() >= VertexBudget(parameters)) {
-      return TooManyVerticesError(VertexBudget(parameters));
+    const auto [segment, from, to] = subsegment;
+    const auto is_between = [&, s = segment, u = from, w = to](double distance) {
+      return planar_->DistanceFromEnd(u, s, false) < distance && distance < planar_->DistanceFromEnd(w, s, false);
+    };
+    const auto by_image = split_by_image.find(segment);
+    if (by_image != split_by_image.end() && std::any_of(by_image->second.begin(), by_image->second.end(), is_between)) {
+      continue;
     }
-    if (nearest.distance_sq < frame_.MinEdge() * frame_.MinEdge()) {
-      const Point<2> at = frame_.Unscaled(position);
-      return absl::ResourceExhaustedError(
-          absl::StrCat("segments: a part of one at (", at[0], ", ", at[1], ") is only ",
-                       2 * std::sqrt(nearest.distance_sq) / frame_.scale,
-                       " long, and another vertex is still too near to it; raise the angles or distances there"));
+    const SegmentPoint place = planar_->MiddleOf(segment, from, to);
+    const SegmentPoint image = planar_->ImageOf(place);
+    WELLSPACE_RETURN_IF_ERROR(AddOnSegment(place, from, parameters));
+    if (image.IsOnSegment()) {
+      WELLSPACE_RETURN_IF_ERROR(AddOnSegment(image, kNoVertex, parameters));
+      split_by_image[image.segment].push_back(planar_->DistanceFromEnd(image, false));
     }
-    const VertexId v = structure_.AddVertex(subsegment.from, position);
-    planar_->AddVertex(place, 0);
-    refinement_->VertexAdded(v);
   }
+  return absl::OkStatus();
+}
+
+// Adds a vertex on a segment, near the vertex `near` if that is one.
+absl::Status PlaneMesher::AddOnSegment(const SegmentPoint& place, VertexId near, const MeshParameters& parameters) {
+  const Point<2> position = planar_->PositionOf(place);
+  const Neighbor nearest = structure_.NearestTo(position, near, workspace_);
+  if (structure_.vertex_count() >= VertexBudget(parameters)) {
+    return TooManyVerticesError(VertexBudget(parameters));
+  }
+  if (nearest.distance_sq < frame_.MinEdge() * frame_.MinEdge()) {
+    const Point<2> at = frame_.Unscaled(position);
+    return absl::ResourceExhaustedError(
+        absl::StrCat("segments: a part of one at (", at[0], ", ", at[1], ") is only ",
+                     2 * std::sqrt(nearest.distance_sq) / frame_.scale,
+                     " long, and another vertex is still too near to it; raise the angles or distances there"));
+  }
+  const VertexId v = structure_.AddVertex(near == kNoVertex ? nearest.vertex : near, position);
+  planar_->AddVertex(place, 0);
+  refinement_->VertexAdded(v);
   return absl::OkStatus();
 }
 

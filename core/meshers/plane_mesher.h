@@ -73,6 +73,7 @@ class PlaneMesher final : public MesherOf<PlaneDomain> {
                                                                 const RunContext& context) const;
   absl::Status Split(std::span<const Subsegment> subsegments, const MeshParameters& parameters,
                      const RunContext& context);
+  absl::Status AddOnSegment(const SegmentPoint& place, VertexId near, const MeshParameters& parameters);
   absl::StatusOr<std::vector<Subsegment>> MakeTriangles(PlanarDomain::Chains chains, int threads, RunContext& context);
 
   LargestArea least_area_;  // of the largest areas in faces that are meshed

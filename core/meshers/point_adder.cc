@@ -55,10 +55,10 @@ absl::StatusOr<std::vector<uint32_t>> PointAdder<D>::AddPoints(std::span<const d
     if (vertex_of[i] != kNoVertex) {
       continue;
     }
+    const uint32_t input = cloud.first_input[i];
     if (is_image[i]) {
-      vertex_added_(structure_.AddVertex(kNoVertex, cloud.points[i]));
+      AddImage(cloud.points[i], input, places);
     } else {
-      const uint32_t input = cloud.first_input[i];
       vertex_of[i] = Add(Start(near, input), cloud.points[i], points, input, places);
     }
   }
@@ -228,6 +228,16 @@ VertexId PointAdder<D>::Add(VertexId near, const Point<D>& p, std::span<const do
   vertex_added_(v);
   numbering_.AddInputVertex(v, points, index);
   return v;
+}
+
+// Adds the image of input `index` at `p`.
+template <int D>
+void PointAdder<D>::AddImage(const Point<D>& p, size_t index, const std::vector<PlanePlace>& places) {
+  const VertexId image = structure_.AddVertex(kNoVertex, p);
+  if (!places.empty()) {
+    placer_->Add(placer_->ImageOf(places[index]));
+  }
+  vertex_added_(image);
 }
 
 template <int D>

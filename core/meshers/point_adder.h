@@ -30,7 +30,7 @@ struct AdderOptions {
   double merge_distance = 0;  // points no farther than this from a vertex become that one
   // By vertex, whether it is given: set for those that points become; null: that is not asked for.
   std::vector<bool>* is_given = nullptr;
-  // The axes along which the box is periodic: a vertex on such a side is added with its images.
+  // The axes along which the box is periodic, if all of it is meshed: a vertex on such a side is added with its images.
   std::span<const int> periodic_axes{};
   // The placer of a domain in the plane, of the same merge distance; null: all of the box is meshed.
   PointPlacer* placer = nullptr;
@@ -55,7 +55,7 @@ class PointAdder {
         merge_distance_(options.merge_distance),
         is_given_(options.is_given),
         placer_(options.placer),
-        periodic_(frame.box, options.periodic_axes) {}
+        periodic_(BoxOfImages(frame, options)) {}
 
   // Mesher::AddPointsNear.
   absl::StatusOr<std::vector<uint32_t>> AddPoints(std::span<const double> points, std::span<const uint32_t> near,
@@ -70,6 +70,15 @@ class PointAdder {
     std::vector<VertexId> vertex_of;  // by input: the vertex that it becomes, kNoVertex for the others
     MergedPoints others;              // `inputs` are numbers among all, `place_of` is by those that are others
   };
+
+  static PeriodicBox<D> BoxOfImages(const Frame<D>& frame, const AdderOptions& options) {
+    if constexpr (D == 2) {
+      if (options.placer != nullptr) {
+        return options.placer->images();
+      }
+    }
+    return PeriodicBox<D>(frame.box, options.periodic_axes);
+  }
 
   // Where the search for input `index` begins.
   VertexId Start(std::span<const uint32_t> near, size_t index) const {
@@ -87,6 +96,7 @@ class PointAdder {
   absl::StatusOr<VertexId> Find(const Point<D>& p, size_t index, VertexId near);
   VertexId Add(VertexId near, const Point<D>& p, std::span<const double> points, size_t index,
                const std::vector<PlanePlace>& places);
+  void AddImage(const Point<D>& p, size_t index, const std::vector<PlanePlace>& places);
   void NoteGiven(VertexId v);
 
   const Frame<D>& frame_;

@@ -80,6 +80,10 @@ PlanePlace PointPlacer::Find(const Point<2>& p, uint32_t index, const Neighbor& 
     refused.too_close.Add(index, TooCloseError(p, index, other));
     return place;
   }
+  if (is_on && first.away != 0 && planar_.sides().ImageOf(first.segment) != PeriodicSides::kNone) {
+    refused.too_close.Add(index, TooCloseError(p, index, first));
+    return place;
+  }
   if (is_on) {
     place.on = planar_.PlaceBeside(p, first.segment);
     return place;

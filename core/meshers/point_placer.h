@@ -14,6 +14,7 @@
 #include "absl/status/statusor.h"
 #include "core/base/ids.h"
 #include "core/base/run_context.h"
+#include "core/geometry/periodic_box.h"
 #include "core/geometry/point.h"
 #include "core/input/frame.h"
 #include "core/input/refused_points.h"
@@ -25,7 +26,7 @@ namespace wellspace::core {
 
 // Finds the places of points in a domain. A point is on a segment if it is no farther away than a quarter of the least
 // separation: vertices of a refined segment are rounded, so that hardly any point is on one exactly. It keeps its
-// coordinates, and vertices on a segment keep their order.
+// coordinates, and vertices on a segment keep their order. On a periodic side it has to be exactly.
 //
 // Thread safety: thread-compatible.
 class PointPlacer {
@@ -47,6 +48,11 @@ class PointPlacer {
   absl::StatusOr<std::vector<PlanePlace>> FindAll(std::span<const double> points,
                                                   const std::function<VertexId(size_t)>& start,
                                                   const RunContext& context);
+
+  // Where the images of points on periodic sides are.
+  const PeriodicBox<2>& images() const { return planar_.sides().box(); }
+  // The place of the image of a point that is on such a side.
+  PlanePlace ImageOf(const PlanePlace& place) const { return {.on = planar_.ImageOf(place.on)}; }
 
   // Tells the domain that the next vertex has been added there.
   void Add(const PlanePlace& place) { planar_.AddVertex(place.on, place.face); }

@@ -38,8 +38,9 @@ namespace wellspace::core {
 //   kNotifiesAll       bool: whether all neighbours get a notice, so that notices are recorded only where they are
 //                      wanted.
 //   kAsksForDistances  bool: whether a request depends on all vertices near its point, and not on the cell alone.
-//   kMayHaveImages     bool: whether vertices may have images, which are inserted with them; then there is periodic(),
-//                      the PeriodicBox that says where.
+//   kMayHaveImages     bool: whether vertices may have images, which are inserted with them; then there are
+//                      HasImages(), whether some may in this domain, and ForEachImage(request, f), which calls
+//                      f(position, place) for each image of the vertex that is asked for.
 //   RulesFor(structure, step_rules, expected)
 //                      The Rules of a run, with a null pointer; or for a record, with the vertices its batch expects.
 //   LeastInRounds(least, vertices)
@@ -122,7 +123,11 @@ class BoxDomain {
   //             that is added from outside, has its images there.
   explicit BoxDomain(const PeriodicBox<D>& periodic) requires(kMayHaveImages) : periodic_(periodic) {}
 
-  const PeriodicBox<D>& periodic() const requires(kMayHaveImages) { return periodic_; }
+  bool HasImages() const requires(kMayHaveImages) { return periodic_.HasAxes(); }
+  template <typename F>
+  void ForEachImage(const Request& request, F f) const requires(kMayHaveImages) {
+    periodic_.ForEachImage(request.point.position, [&](const Point<D>& at) { f(at, Place{}); });
+  }
 
   Rules RulesFor(const QueryStructure<D>& /*structure*/, const StepRules<D>& rules,
                  const Expected* /*expected*/) const {

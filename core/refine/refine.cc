@@ -310,7 +310,7 @@ template <typename Domain>
 absl::StatusOr<VertexId> Refinement<Domain>::Insert(const typename Domain::Request& request) {
   const SteinerPoint<D>& point = request.point;
   if constexpr (Domain::kMayHaveImages) {
-    FindImages(point.position);
+    FindImages(request);
   }
   if (structure_.vertex_count() + images_.size() >= max_vertices_) {
     return TooManyVerticesError(max_vertices_);
@@ -327,7 +327,7 @@ absl::StatusOr<VertexId> Refinement<Domain>::Insert(const typename Domain::Reque
   Insertion insertion = request.insertion;
   insertion.vertex = AddVertex(insertion.near, insertion.near, point, request.place);
   for (const Image& image : images_) {
-    AddVertex(image.near, insertion.vertex, image.point, {});
+    AddVertex(image.near, insertion.vertex, image.point, image.place);
   }
   if (*observer_) {
     (*observer_)(structure_, insertion);
@@ -335,24 +335,25 @@ absl::StatusOr<VertexId> Refinement<Domain>::Insert(const typename Domain::Reque
   return insertion.vertex;
 }
 
-// Finds the images of `p`, and how near to them vertices are or, by then, will be. All vertices of a periodic side have
-// theirs, so where there is none at `p` there is none at its images. Which of the nearest vertices is found depends on
-// what has been committed: it may say where the search begins, and nothing else.
+// Finds the images of a vertex, and how near to them vertices are or, by then, will be. All vertices of a periodic side
+// have theirs: where there is none at a place there is none at its images. Which of the nearest vertices is found
+// depends on what has been committed: it may say where the search begins, and nothing else.
 template <typename Domain>
-void Refinement<Domain>::FindImages(const Point<D>& p) {
+void Refinement<Domain>::FindImages(const typename Domain::Request& request) {
   images_.clear();
   if constexpr (Domain::kMayHaveImages) {
-    if (!domain_.periodic().HasAxes()) {
+    if (!domain_.HasImages()) {
       return;
     }
-    domain_.periodic().ForEachImage(p, [&](const Point<D>& at) {
+    const Point<D>& p = request.point.position;
+    domain_.ForEachImage(request, [&](const Point<D>& at, const typename Domain::Place& place) {
       const Neighbor nearest = structure_.NearestTo(at, kNoVertex, workspace_.other);
       double empty_sq = structure_.NearestUncommittedSq(at, nearest.distance_sq);
       empty_sq = std::min(empty_sq, DistanceSq<D>(at, p));
       for (const Image& other : images_) {
         empty_sq = std::min(empty_sq, DistanceSq<D>(at, other.point.position));
       }
-      images_.push_back({{at, empty_sq}, nearest.vertex});
+      images_.push_back({{at, empty_sq}, nearest.vertex, place});
     });
   }
 }

@@ -120,6 +120,7 @@ class Refinement {
   struct Image {
     SteinerPoint<D> point;
     VertexId near = kNoVertex;
+    [[no_unique_address]] typename Domain::Place place;
   };
 
   // The cells of all vertices that have been added, for CellSteps.
@@ -152,7 +153,7 @@ class Refinement {
   template <typename Steps>
   void Finish(VertexId v, const Assessment& found, int bucket, Steps& steps);
   absl::StatusOr<VertexId> Insert(const typename Domain::Request& request);
-  void FindImages(const Point<D>& p);
+  void FindImages(const typename Domain::Request& request);
   absl::Status CheckPoint(const SteinerPoint<D>& point) const;
   VertexId AddVertex(VertexId near, VertexId beside, const SteinerPoint<D>& point, const typename Domain::Place& place);
   void AddPending(VertexId near, VertexId x, double nearest_sq);

@@ -75,6 +75,13 @@ absl::Status Session::AddFeatures(const FeaturePart& part, const FeatureCounts& 
     absl::MutexLock lock(&mutex_);
     const FeatureStore& features = *stores_.features;
     WELLSPACE_RETURN_IF_ERROR(CheckReady(occupancy_, *state_, stores_.point_count(), expected_revision));
+    if (part.has_triangles() && !state_->parameters->periodic_axes.empty()) {
+      return MakeError(v1::ERROR_REASON_INVALID_TRIANGLES,
+                       absl::StrCat("triangles: ", name(),
+                                    " has periodic_axes, which a domain with a surface does not have; create another "
+                                    "session without them for this domain"),
+                       "triangles");
+    }
     WELLSPACE_RETURN_IF_ERROR(CheckRepeated(part, offset, features, name(), &known));
     added = CountsOf(part) - known;
     if (added.all() == 0 && !features.HasOtherRules(part)) {

@@ -122,7 +122,8 @@ absl::Status FromCore(const absl::Status& status) {
       for (const auto& [what, field] : {std::pair("segments", "segments.ends"),
                                         {"markers:", "segments.markers"},
                                         {"seeds[", "faces.seeds"},
-                                        {"faces:", "faces.faces"}}) {
+                                        {"faces:", "faces.faces"},
+                                        {"periodic_axes:", "segments.ends"}}) {
         if (message.rfind(what, 0) == 0) {
           return MakeError(v1::ERROR_REASON_INVALID_SEGMENTS, message, field);
         }

@@ -16,6 +16,7 @@
 #include "core/features/features.h"
 #include "core/meshers/mesher.h"
 #include "core/validate/validate.h"
+#include "core/validate/validate_periodic.h"
 #include "server/inputs/space_features.h"
 #include "server/wire/convert.h"
 #include "tests/fuzz/fuzz.h"
@@ -156,7 +157,8 @@ void RequireDomainOrRefusal(const core::MeshParameters& parameters, double max_a
                                     core::ValidateSizing(view, {.max_circumradius = parameters.max_circumradius,
                                                                .boxes = parameters.size_boxes,
                                                                .samples = parameters.size_samples.get(),
-                                                               .gradation = parameters.gradation})}) {
+                                                               .gradation = parameters.gradation}),
+                                    core::ValidatePeriodic(view, parameters.periodic_axes)}) {
     Require(valid.ok(), "a mesh is valid:", valid.ToString());
   }
 }

@@ -1,5 +1,5 @@
-"""The wheel of scripts/wheel: what is in it, and that it meshes where nothing of ours, and no library of ours, is
-installed.
+"""The wheel of scripts/wheel: what is in it, and that it meshes, writes and reads files where nothing of ours, and no
+library of ours, is installed.
 
 The roots have Python, venv with pip, numpy, grpcio and protobuf of their distribution, which pip finds there: the wheel
 wants the last three, and nothing asks a network. Wants root, debootstrap, unshare and a mirror; takes some minutes.
@@ -30,6 +30,12 @@ points = numpy.loadtxt("/work/spot.csv", delimiter=",", skiprows=1)
 mesh = wellspace.mesh(points)
 assert (mesh.points[mesh.input_vertices] == points).all()
 mesh.save("/work/spot.npz")
+for name in ("vtu", "msh", "su2"):  # by the tool
+    mesh.save(f"/work/spot.{name}")
+    if name == "su2":  # which is only written
+        continue
+    again = wellspace.read(f"/work/spot.{name}")
+    assert (again.points == mesh.points).all() and (again.simplices == mesh.simplices).all(), name
 print(len(mesh.points), wellspace.__file__)
 """
 
@@ -66,9 +72,11 @@ class Wheel(unittest.TestCase):
         """All but those of glibc; and by a path that LD_LIBRARY_PATH does not come before."""
         libraries = {path.name for path in (self.unpacked / PROGRAMS / "lib").iterdir()}
         self.assertGreater(len(libraries), 60)
+        self.assertNotIn("libcairo.so.2", libraries)  # it is loaded when it is first used, with X11
         for name in self.names:
             if name.startswith(PROGRAMS):
                 self.assertTrue(self.modes[name] & 0o111, name)
+            if name.startswith(PROGRAMS) and not name.endswith("/wellspaced"):  # which is a script
                 dynamic = output_of("readelf", "-d", self.unpacked / name)
                 needed = set(re.findall(r"\(NEEDED\) .*\[(.*)\]", dynamic))
                 outside = needed - libraries
@@ -80,8 +88,8 @@ class Wheel(unittest.TestCase):
     def test_licences_of_all_that_is_taken_in(self):
         folder = self.info / "licenses" / "third_party"
         packages = {path.name for path in folder.iterdir()} - {"VERSIONS", "THIRD_PARTY.md"}
-        self.assertLessEqual({"libgrpc29", "libstdc++6", "libssl3", "libabsl20220623", "libcli11-dev"}, packages)
-        for other in ("libc6", "libcairo2", "libhdf5-dev"):  # of the system, and of the tool
+        self.assertLessEqual({"libgrpc29", "libstdc++6", "libssl3", "libabsl20220623", "libcli11-dev", "libhdf5-dev"}, packages)
+        for other in ("libc6", "libcairo2", "libx11-6"):  # of the system
             self.assertNotIn(other, packages)
         versions = (folder / "VERSIONS").read_text().splitlines()[2:]
         self.assertEqual({line.split()[0] for line in versions}, packages)
@@ -112,11 +120,29 @@ class Wheel(unittest.TestCase):
         here, there = numpy.load(self.folder / "spot.npz"), numpy.load(root.path / "work/spot.npz")
         for name in ("points", "simplices"):
             numpy.testing.assert_array_equal(here[name], there[name])
-        self.assertIn("wellspaced ", root.run("/work/venv/bin/wellspaced", "--version"))
+        for name in ("spot.vtu", "spot.msh", "spot.su2"):
+            chroot.run_here(BUILD / "bin/wellspace", "convert", self.folder / "spot.npz", self.folder / name)
+            self.assertEqual((self.folder / name).read_bytes(), (root.path / "work" / name).read_bytes(), name)
+        self.check_commands(root)
         self.assertNotIn("wellspace", root.run("dpkg-query", "--show"))
         root.run("/work/venv/bin/pip", "uninstall", "-y", "wellspace")
         left = root.run("find", "/work/venv", "-name", "*wellspace*")
         self.assertEqual(left, "")
+
+    def check_commands(self, root):
+        self.assertRegex(root.run("/work/venv/bin/wellspace", "--version"), r"^wellspace \d")
+        self.assertRegex(root.run("/work/venv/bin/wellspaced", "--version"), r"^wellspaced \d")
+        (site,) = (root.path / "work/venv/lib").glob("python3*/site-packages/wellspace")
+        root.run("ln", "-s", f"/{site.relative_to(root.path)}/_programs/bin/wellspaced", "/work/server")
+        self.assertRegex(root.run("/work/server", "--version"), r"^wellspaced \d")
+        # Pictures want the system's Cairo.
+        render = ["/work/venv/bin/wellspace", "render", "/work/spot.vtu", "-o", "/work/spot.png"]
+        done = subprocess.run(root.command(*render), capture_output=True, text=True, check=False)
+        self.assertNotEqual(done.returncode, 0)
+        self.assertIn("package libcairo2", done.stderr)
+        root.apt("install", "libcairo2")
+        root.run(*render)
+        self.assertTrue((root.path / "work/spot.png").read_bytes().startswith(b"\x89PNG"))
 
     def test_in_other_systems(self):
         if not chroot.is_possible():

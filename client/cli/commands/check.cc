@@ -364,9 +364,6 @@ core::ValidationOptions CheckCommand::ValidationFor(const WantedSizes& sizes, st
 }
 
 absl::Status CheckCommand::CheckOptionsOfDomain() const {
-  if (!periodic_axes.empty()) {
-    return absl::InvalidArgumentError("--periodic: it is for boxes, and the mesh is one of a domain");
-  }
   if (criterion == client::Criterion::kWellSpaced) {
     return absl::InvalidArgumentError(
         "--criterion well-spaced: a domain with segments or triangles has the radius-edge one alone");
@@ -402,6 +399,10 @@ absl::Status CheckCommand::ValidateShapes(const core::MeshView& view, const Want
 absl::Status CheckCommand::Validate(const formats::Mesh& mesh, const core::MeshView& view, const WantedSizes& sizes,
                                     std::span<const double> cloud, client::Json& json) const {
   if (surface.IsAsked() || (mesh.dimension == 3 && HasFeatures(mesh))) {
+    if (!periodic_axes.empty()) {
+      return absl::InvalidArgumentError(
+          "--periodic: it is for boxes and for domains in the plane, and the mesh is one of a surface");
+    }
     WELLSPACE_RETURN_IF_ERROR(CheckOptionsOfDomain());
     WELLSPACE_RETURN_IF_ERROR(surface.Check(mesh, rho, format, json));
     return ValidateShapes(view, sizes, {});
@@ -409,6 +410,7 @@ absl::Status CheckCommand::Validate(const formats::Mesh& mesh, const core::MeshV
   if (HasFeatures(mesh) || IsCloudADomain()) {
     WELLSPACE_RETURN_IF_ERROR(CheckOptionsOfDomain());
     WELLSPACE_RETURN_IF_ERROR(ValidateDomain(mesh, view, cloud));
+    WELLSPACE_RETURN_IF_ERROR(core::ValidatePeriodic(view, periodic_axes));
     return ValidateShapes(view, sizes, cloud);
   }
   WELLSPACE_RETURN_IF_ERROR(core::ValidateMesh(view, ValidationFor(sizes, cloud, mesh.dimension)));
@@ -538,7 +540,8 @@ void AddCheckCommand(CLI::App& app, int& exit_code) {
             "Bound on the dihedral angles, in 2-D on the angles, in degrees; default: not checked")
       ->check(AboveZero());
   AddPeriodic(*check, command->periodic_axes,
-              "Axes along which opposite sides of the box must match, vertex by vertex and facet by facet, as x,y; "
+              "Axes along which opposite sides of the box, or of a domain's bounding rectangle, must match, vertex by "
+              "vertex and facet by facet, as x,y; "
               "default: none");
   check
       ->add_option("--plot", command->plot_path, "Draw histograms of angles and radius-edge ratios, .png, .svg or .pdf")

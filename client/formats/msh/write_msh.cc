@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -33,6 +34,7 @@ class MshWriter : public MeshWriter {
   absl::Status AddPoints(std::span<const double> points) final {
     BeginNodes();
     pairs_.Add(points);
+    NoteSides(points);
     for (; !points.empty() && output_.status().ok(); points = points.subspan(shape_.dimension)) {
       row_.clear();
       AppendNode(points.first(shape_.dimension), ++vertices_, row_);
@@ -84,6 +86,7 @@ class MshWriter : public MeshWriter {
       if (walk_.is_first()) {
         AppendBlock(part, row_);
       }
+      NoteFacet(facets.first(shape_.dimension), part.tag);
       AppendFacet(facets.first(nodes), part.tag, simplices_ + ++facets_, row_);
       output_.Write(row_);
     }
@@ -191,7 +194,46 @@ class MshWriter : public MeshWriter {
     }
   }
 
-  // The sides are entities by the tags that the parts of a box's boundary have.
+  // The sides across periodic axes that vertices are on: a bit for each.
+  void NoteSides(std::span<const double> points) {
+    for (; !shape_.periodic_axes.empty() && !points.empty(); points = points.subspan(shape_.dimension)) {
+      uint8_t on = 0;
+      for (const int axis : shape_.periodic_axes) {
+        on |= points[axis] == shape_.low[axis] ? SideBit(axis, false) : 0;
+        on |= points[axis] == shape_.high[axis] ? SideBit(axis, true) : 0;
+      }
+      sides_.push_back(on);
+    }
+  }
+
+  void NoteFacet(std::span<const uint32_t> corners, int32_t tag) {
+    if (shape_.periodic_axes.empty()) {
+      return;
+    }
+    uint8_t on = 0xff;
+    for (const uint32_t corner : corners) {
+      on &= sides_[corner];
+    }
+    PartSides& part = part_sides_[tag];
+    part.of_all &= on;
+    part.of_some |= on;
+  }
+
+  // The part of the boundary that is one side, and nothing else; none if there is no such part.
+  std::optional<int32_t> PartOn(uint8_t side) const {
+    std::optional<int32_t> found;
+    for (const auto& [tag, part] : part_sides_) {
+      if ((part.of_some & side) != 0) {
+        if (found.has_value() || (part.of_all & side) == 0) {
+          return std::nullopt;
+        }
+        found = tag;
+      }
+    }
+    return found;
+  }
+
+  // The sides are the entities of parts of the boundary.
   absl::Status WritePeriodic() {
     if (shape_.periodic_axes.empty() || shape_.boundary.empty()) {
       AddNote(shape_.periodic_axes.empty()
@@ -203,18 +245,17 @@ class MshWriter : public MeshWriter {
     AppendLinks(shape_.periodic_axes.size(), row_);
     for (const int axis : shape_.periodic_axes) {
       WELLSPACE_ASSIGN_OR_RETURN(const std::vector<VertexPair> pairs, pairs_.Across(axis));
-      const int32_t low = 2 * axis + 1;
-      if (!IsSide(low, axis, "min") || !IsSide(low + 1, axis, "max")) {
-        // Of a mesh from elsewhere tags may stand for anything.
-        const char letter = "xyz"[axis];
+      const std::optional<int32_t> low = PartOn(SideBit(axis, false));
+      const std::optional<int32_t> high = PartOn(SideBit(axis, true));
+      if (!low.has_value() || !high.has_value()) {
         return absl::InvalidArgumentError(
-            absl::StrCat("periodic axis ", std::string(1, letter), ": expected sides of the boundary with the tags ",
-                         low, " and ", low + 1, " and the names ", std::string(1, letter), "min and ",
-                         std::string(1, letter), "max, as wellspace has them; convert to .npz, or without --periodic"));
+            absl::StrCat("periodic axis ", std::string(1, "xyz"[axis]),
+                         ": .msh has pairs of parts of the boundary; expected one part on each of the two sides, with "
+                         "all facets there and no others; give those facets two markers of their own, or write .npz"));
       }
       AppendLink({.axis = axis,
-                  .entity = groups_.part_entities().at(low + 1),
-                  .master = groups_.part_entities().at(low),
+                  .entity = groups_.part_entities().at(*high),
+                  .master = groups_.part_entities().at(*low),
                   .length = shape_.high[axis] - shape_.low[axis],
                   .pairs = pairs.size()},
                  row_);
@@ -229,13 +270,7 @@ class MshWriter : public MeshWriter {
     return output_.status();
   }
 
-  // Whether the part with this tag is the side of a box at an end of an axis.
-  bool IsSide(int32_t tag, int axis, const char* end) const {
-    const std::string name = absl::StrCat(std::string(1, "xyz"[axis]), end);
-    return groups_.part_entities().contains(tag) &&
-           std::any_of(shape_.boundary.begin(), shape_.boundary.end(),
-                       [&](const BoundaryPart& part) { return part.tag == tag && part.name == name; });
-  }
+  static uint8_t SideBit(int axis, bool is_high) { return static_cast<uint8_t>(1 << (2 * axis + (is_high ? 1 : 0))); }
 
   // One text, the name; one number, the time; four whole numbers: the step, numbers in a value, values, the partition.
   template <typename Value>
@@ -253,11 +288,19 @@ class MshWriter : public MeshWriter {
   const bool is_binary_;
   bool has_nodes_ = false;     // the section
   bool has_elements_ = false;  // the section
+  // The periodic sides that all facets of a part are on, and those that some are on.
+  struct PartSides {
+    uint8_t of_all = 0xff;
+    uint8_t of_some = 0;
+  };
+
   uint64_t vertices_ = 0;
   uint64_t simplices_ = 0;
   uint64_t facets_ = 0;
   PartWalk walk_{shape_.boundary};
   PeriodicPairs pairs_{shape_};
+  std::vector<uint8_t> sides_;               // by vertex, where an axis is periodic
+  std::map<int32_t, PartSides> part_sides_;  // by tag
   std::vector<double> weights_;
   std::string row_;
 };

@@ -25,9 +25,10 @@ double PseudoAngleFrom(double from, const Point<2>& d) {
 
 }  // namespace
 
-PlanarDomain::PlanarDomain(PlanarGraph graph, PlanarFaces faces)
+PlanarDomain::PlanarDomain(PlanarGraph graph, PlanarFaces faces, PeriodicSides sides)
     : graph_(std::move(graph)),
       faces_(std::move(faces)),
+      sides_(std::move(sides)),
       has_small_angle_(2 * graph_.segments.size()),
       splits_(graph_.segments.size()),
       has_area_bounds_(std::any_of(faces_.faces.begin(), faces_.faces.end(),
@@ -148,7 +149,7 @@ PlanarDomain::Chains PlanarDomain::FindChains() const {
 
 uint64_t PlanarDomain::MemoryBytes() const {
   return graph_.points.size() * (sizeof(Point<2>) + 4 * sizeof(uint32_t)) +
-         segment_count() * (sizeof(GraphSegment) + sizeof(double) + 7 * sizeof(uint32_t)) +
+         segment_count() * (sizeof(GraphSegment) + sizeof(double) + 7 * sizeof(uint32_t)) + sides_.MemoryBytes() +
          places_.size() * sizeof(InsertedPlace);
 }
 

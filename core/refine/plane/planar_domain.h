@@ -14,6 +14,7 @@
 
 #include "core/base/ids.h"
 #include "core/base/memory/huge_pages.h"
+#include "core/features/periodic_sides.h"
 #include "core/features/planar_faces.h"
 #include "core/features/planar_graph.h"
 #include "core/geometry/point.h"
@@ -35,11 +36,12 @@ inline constexpr double kRadiusSqOfArea = 0.76980035891950102;
 // Thread safety: thread-compatible; const functions may run at once. Beside AddVertex, where MakeRoom has made room for
 // the vertex, those of them may run that are asked of segments, or of vertices that there were before.
 // Invariants: (1) a vertex that is on no segment lies inside a face that is meshed; (2) segments and faces stay as they
-//             were made.
+//             were made; (3) between two calls of those who add vertices, each vertex on a periodic side has its image.
 class PlanarDomain {
  public:
-  // REQUIRES:   every point of the graph is an end of a segment, or lies in a face that is meshed.
-  PlanarDomain(PlanarGraph graph, PlanarFaces faces);
+  // REQUIRES:   every point of the graph is an end of a segment, or lies in a face that is meshed; `sides` are those of
+  //             the graph.
+  PlanarDomain(PlanarGraph graph, PlanarFaces faces, PeriodicSides sides = {});
 
   const PlanarGraph& graph() const { return graph_; }
   const PlanarFaces& faces() const { return faces_; }
@@ -66,6 +68,12 @@ class PlanarDomain {
 
   // Whether two ways that lead from the first end of `h` make an angle of less than 60 degrees, of which h is one.
   bool HasSmallAngle(HalfEdge h) const { return has_small_angle_[h]; }
+  // The same of `h` or of its image: distances on both that are rounded for such an angle stay equal.
+  bool HasSmallAngleAcross(HalfEdge h) const {
+    const uint32_t image = sides_.ImageOf(SegmentOf(h));
+    return has_small_angle_[h] || (image != PeriodicSides::kNone &&
+                                   has_small_angle_[HalfEdgeOf(image, IsFromB(h) != sides_.IsTurned(SegmentOf(h)))]);
+  }
   // The smallest angle between two segments with a common end. Unit: radians; pi where there are no two.
   double MinAngle() const { return min_angle_; }
 
@@ -109,6 +117,17 @@ class PlanarDomain {
     const bool is_from_b = FootOf(p, segment).from_a > 0.5 * LengthOf(segment);
     const Point<2> from = Difference<2>(p, EndOf(segment, is_from_b));
     return {segment, is_from_b, Dot<2>(from, DirectionOf(HalfEdgeOf(segment, is_from_b))) / LengthOf(segment)};
+  }
+
+  // Periodic sides.
+
+  const PeriodicSides& sides() const { return sides_; }
+  // The image of a place on a segment; on none if that has no image. Its position has the other coordinate to the bit.
+  SegmentPoint ImageOf(const SegmentPoint& place) const {
+    const uint32_t image = place.IsOnSegment() ? sides_.ImageOf(place.segment) : PeriodicSides::kNone;
+    return image == PeriodicSides::kNone
+               ? SegmentPoint()
+               : SegmentPoint{image, place.is_from_b != sides_.IsTurned(place.segment), place.distance};
   }
 
   // Vertices.
@@ -192,6 +211,7 @@ class PlanarDomain {
 
   PlanarGraph graph_;
   PlanarFaces faces_;
+  PeriodicSides sides_;
   std::vector<double> lengths_;  // by segment
   std::vector<HalfEdge> ways_;   // 2 of each segment: pieces from a vertex on it, toward b and a
   double min_angle_ = std::numbers::pi;

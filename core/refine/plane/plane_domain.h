@@ -35,7 +35,7 @@ class PlaneDomain {
   static constexpr bool kHasFeatures = true;
   static constexpr bool kNotifiesAll = true;
   static constexpr bool kAsksForDistances = true;
-  static constexpr bool kMayHaveImages = false;
+  static constexpr bool kMayHaveImages = true;
 
   // REQUIRES:   `planar` outlives this and all copies; its vertices are those of the structure.
   explicit PlaneDomain(PlanarDomain& planar) : planar_(&planar) {}
@@ -49,6 +49,14 @@ class PlaneDomain {
   }
   void MakeRoom(size_t vertices) { planar_->MakeRoom(vertices); }
   void Added(const Place& place) { planar_->AddVertex(place.on, place.face); }
+  bool HasImages() const { return planar_->sides().HasAxes(); }
+  template <typename F>
+  void ForEachImage(const Request& request, F f) const {
+    const SegmentPoint image = planar_->ImageOf(request.place.on);
+    if (image.IsOnSegment()) {
+      f(planar_->PositionOf(image), Place{.on = image});
+    }
+  }
   bool AreInOrder(std::span<const Request> requests) const { return AreSplitsInOrder(*planar_, requests); }
   uint64_t MemoryBytes() const { return planar_->MemoryBytes(); }
 

@@ -58,8 +58,8 @@ PlanePlace RoundPlace(const VisibleDomain& visible, SegmentPoint on, double room
   const PlanarDomain& domain = visible.domain();
   const uint32_t segment = on.segment;
   const double length = domain.LengthOf(segment);
-  const bool is_small_at_a = domain.HasSmallAngle(HalfEdgeOf(segment, false));
-  const bool is_small_at_b = domain.HasSmallAngle(HalfEdgeOf(segment, true));
+  const bool is_small_at_a = domain.HasSmallAngleAcross(HalfEdgeOf(segment, false));
+  const bool is_small_at_b = domain.HasSmallAngleAcross(HalfEdgeOf(segment, true));
   const SplitOrder order = is_small_at_a && is_small_at_b ? visible.OrderOfSplit(segment) : SplitOrder::kAny;
   if (order == SplitOrder::kFirst) {
     on.distance = std::max(on.distance, length / 3);

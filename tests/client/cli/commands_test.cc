@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -502,6 +503,13 @@ TEST_F(CommandsTest, RenderMakesPictures) {
   const RunResult nothing = RunWellspace({"render", Path("space.vtu"), "-o", Path("none.png"), "--plane", "1,0,0,-50"});
   EXPECT_EQ(nothing.exit_code, 2);
   EXPECT_THAT(nothing.err, HasSubstr("space.vtu: the plane cuts off all"));
+  // A Cairo that cannot be loaded.
+  folder_.Write("libcairo.so.2", "");
+  const RunResult loaded = RunWellspace({"render", Path("plane.vtu"), "-o", Path("c.png")},
+                                        {.input = "", .environment = {"LD_LIBRARY_PATH=" + folder_.Path("")}});
+  EXPECT_NE(loaded.exit_code, 0);
+  EXPECT_THAT(loaded.err, AllOf(HasSubstr("libcairo.so.2: file too short"), HasSubstr("package libcairo2")));
+  EXPECT_FALSE(std::filesystem::exists(Path("c.png")));
 }
 
 TEST_F(CommandsTest, ServerInfoOfTheEmbeddedServer) {

@@ -37,6 +37,16 @@ TEST_F(UsageTest, HelpAndVersion) {
   EXPECT_THAT(version.out, testing::StartsWith("wellspace "));
 }
 
+// As in a wheel, where both are one file.
+TEST_F(UsageTest, TheToolIsTheServerToo) {
+  const RunResult version = RunWellspace({"wellspaced", "--version"});
+  EXPECT_EQ(version.exit_code, 0) << version.err;
+  EXPECT_THAT(version.out, testing::StartsWith("wellspaced "));
+  const RunResult wrong = RunWellspace({"wellspaced", "--no-such-option"});
+  EXPECT_EQ(wrong.exit_code, 2);
+  EXPECT_THAT(wrong.err, HasSubstr("--no-such-option"));
+}
+
 TEST_F(UsageTest, WrongUsageIsExitCode2) {
   const std::string cloud = folder_.Write("cloud.csv", kPlane);
   const std::string out = Path("out.vtu");

@@ -169,17 +169,19 @@ class LocalServerTest(Case):
                 with self.subTest(expected), own_part, mock.patch.dict(os.environ, changes, clear=True):
                     self.assertEqual(_server.find_binary(), f"{folder}/{expected}/wellspaced")
 
-    def test_the_command_of_a_wheel_is_its_program(self):
-        with tempfile.TemporaryDirectory() as folder:
-            program = pathlib.Path(folder, "wellspaced")
-            program.write_text("#!/bin/sh\necho \"$@\"\nexit 3\n")
-            program.chmod(0o755)
-            code = ("import pathlib, sys; from wellspace import _commands, _server; "
-                    "_server._OWN_PROGRAMS = pathlib.Path(sys.argv.pop(1)); _commands.")
-            done = run_python(code + "wellspaced()", folder, "--listen", "a b")
-            self.assertEqual((done.returncode, done.stdout), (3, "--listen a b\n"))
-            done = run_python(code + "wellspaced()", f"{folder}/none")
-            self.assertEqual((done.returncode, done.stderr), (1, "wellspaced: this package has no server inside\n"))
+    def test_the_commands_of_a_wheel_are_its_programs(self):
+        code = ("import pathlib, sys; from wellspace import _commands, _server; "
+                "_server._OWN_PROGRAMS = pathlib.Path(sys.argv.pop(1)); _commands.")
+        for name in ("wellspace", "wellspaced"):
+            with self.subTest(name), tempfile.TemporaryDirectory() as folder:
+                program = pathlib.Path(folder, name)
+                program.write_text("#!/bin/sh\necho \"$@\"\nexit 3\n")
+                program.chmod(0o755)
+                done = run_python(f"{code}{name}()", folder, "--listen", "a b")
+                self.assertEqual((done.returncode, done.stdout), (3, "--listen a b\n"))
+                done = run_python(f"{code}{name}()", f"{folder}/none")
+                message = f"{name}: this package has no such program inside\n"
+                self.assertEqual((done.returncode, done.stderr), (1, message))
 
     def test_does_not_start(self):
         with self.fails(UnavailableError, "--max-points"):

@@ -229,6 +229,16 @@ TEST_F(TrianglesTest, WhatAllOfItShowsFailsTheFirstRefinementWhichMayBeTriedAgai
   EXPECT_EQ(calls_.Refine(name).state(), v1::Operation::STATE_SUCCEEDED);
 }
 
+TEST_F(TrianglesTest, APeriodicSessionHasNone) {
+  v1::CreateSessionRequest request;
+  request.mutable_parameters()->set_dimension(3);
+  request.mutable_parameters()->add_periodic_axes(0);
+  const std::string name = calls_.Create(request).name();
+  calls_.Upload(name, 0, BlockPoints());
+  ExpectRefused(BlockRequest(name), grpc::StatusCode::INVALID_ARGUMENT, "INVALID_TRIANGLES", "triangles");
+  EXPECT_THAT(status_.error_message(), HasSubstr("periodic_axes"));
+}
+
 TEST_F(TrianglesTest, TrianglesComeBeforeTheFirstRefinement) {
   const std::string name = CreateBlock();
   calls_.Refine(name);

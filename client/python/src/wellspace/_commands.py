@@ -1,16 +1,26 @@
-"""The command `wellspaced` of a wheel that has the server."""
+"""The commands `wellspace` and `wellspaced` of a wheel that has the tool and the server."""
 
 from __future__ import annotations
 
 import os
 import sys
+from typing import NoReturn
 
 from ._server import own_program
 
 
-def wellspaced() -> None:
+def wellspace() -> NoReturn:
+    """Goes on as the tool, with the same arguments."""
+    _go_on_as("wellspace")
+
+
+def wellspaced() -> NoReturn:
     """Goes on as the server, with the same arguments."""
-    program = own_program("wellspaced")
+    _go_on_as("wellspaced")
+
+
+def _go_on_as(name: str) -> NoReturn:
+    program = own_program(name)
     if program is None:
-        sys.exit("wellspaced: this package has no server inside")
-    os.execv(program, ["wellspaced", *sys.argv[1:]])
+        sys.exit(f"{name}: this package has no such program inside")
+    os.execv(program, [name, *sys.argv[1:]])

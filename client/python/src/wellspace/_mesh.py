@@ -205,8 +205,8 @@ class Mesh(MeshArrays):
 
         ``.npz`` needs nothing else. ``.vtu``, ``.vtkhdf``, ``.hdf``, ``.vtk``, ``.xdmf``, ``.msh``, ``.mesh``,
         ``.su2``, ``.inp``, ``.node``, ``.ele``, ``.14``, ``.grd``, ``.gr3`` and ``.2dm`` are written by the tool
-        `wellspace`, on the path or named by ``$WELLSPACE_TOOL_BINARY``: the bytes of ``wellspace convert``, with
-        names of parts and regions.
+        `wellspace`, that of ``$WELLSPACE_TOOL_BINARY``, of the wheel or on the path: the bytes of
+        ``wellspace convert``, with names of parts and regions.
         Other formats, those without the tool, and all with `options`, are those of `meshio.write`, in 2-D and 3-D.
 
         With ``order=2`` elements are of second order (`to_order`): ``.npz``, which has the arrays of `SecondOrderMesh`,

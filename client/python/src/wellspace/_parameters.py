@@ -78,8 +78,9 @@ class Parameters(TypedDict, total=False):
         it cannot change. Default 0: equal points only.
     periodic : str or sequence of int
         Axes along which the box is periodic, as ``"xy"`` or ``[0, 1]``: for each vertex on one of two opposite sides
-        there is one on the other, and the facets on both match; see `Mesh.periodic_pairs`. For points in 2-D and 3-D,
-        without segments, triangles or `pump_weights`. In a session it cannot change. Default: none.
+        there is one on the other, and the facets on both match; see `Mesh.periodic_pairs`. In 2-D and 3-D,
+        without triangles and `pump_weights`. With segments, opposite sides of their bounding rectangle have to have
+        the same ones. In a session it cannot change. Default: none.
     keep_vertices : bool
         In a session: vertices of its last mesh stay where they are, and the repair of slivers moves only new ones.
         Default False.

@@ -82,8 +82,8 @@ def read(
 ) -> CloudFile | DomainFile | SurfaceFile | Mesh:
     """Reads a file of points, of a domain, of a surface or of a mesh, whichever its extension says.
 
-    ``.npz`` is read by numpy, ``.stl`` as `read_surface` does, and all others by the tool `wellspace`, on the path or
-    named by ``$WELLSPACE_TOOL_BINARY``.
+    ``.npz`` is read by numpy, ``.stl`` as `read_surface` does, and all others by the tool `wellspace`: that
+    of ``$WELLSPACE_TOOL_BINARY``, of the wheel or on the path.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ MESH_FORMATS = frozenset(
 
 
 def find() -> str | None:
-    """The program: $WELLSPACE_TOOL_BINARY, or `wellspace` on the path; none if it is not there."""
+    """The program: $WELLSPACE_TOOL_BINARY, that of the wheel, or `wellspace` on the path; none if it is not there."""
     return find_program(_NAME, _VARIABLE)
 
 
