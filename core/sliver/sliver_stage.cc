@@ -189,6 +189,7 @@ absl::Status SliverStage<D>::FollowStructure(const QueryStructure<D>& structure,
     triangulation_.reset();
   }
   if (!triangulation_.has_value()) {
+    cosines_ = {};
     WELLSPACE_ASSIGN_OR_RETURN(triangulation_, Triangulate(structure, stars, threads, context));
     return absl::OkStatus();
   }
@@ -204,6 +205,7 @@ absl::Status SliverStage<D>::FollowStructure(const QueryStructure<D>& structure,
     triangulation_->FindCavity(triangulation_->Locate(p, start), p, cavity);
     last = triangulation_->AddVertex();
     triangulation_->Insert(last, p, 0, cavity, created);
+    cosines_.NoteCreated(created);
   }
   return absl::OkStatus();
 }
@@ -219,7 +221,7 @@ absl::Status SliverStage<D>::Repair(QueryStructure<3>& structure, Refinement<Dom
   WELLSPACE_RETURN_IF_ERROR(FollowStructure(structure, refinement.stars(), threads, context));
   context.EnterPhase(Phase::kSlivers);
   Follower<Domain> follower(*triangulation_, structure, refinement, moved);
-  Repairer<Carrier> repairer(*triangulation_, carrier, is_fixed, criteria, follower);
+  Repairer<Carrier> repairer(*triangulation_, carrier, is_fixed, criteria, cosines_, follower);
   const absl::Status status = repairer.Run(threads, context);
   if (!Carrier::kMeshesAll && statistics_.moves + statistics_.added == 0 && repairer.report().min_angle_deg) {
     statistics_.min_angle_deg = repairer.report().min_angle_deg;  // tetrahedra that are not meshed have other angles
@@ -229,6 +231,7 @@ absl::Status SliverStage<D>::Repair(QueryStructure<3>& structure, Refinement<Dom
   statistics_.left_by = repairer.report().left_by;
   statistics_.flattest_left = repairer.report().flattest_left;
   statistics_.operations += repairer.report().operations;
+  statistics_.measured += repairer.report().measured;
   statistics_.moves += repairer.report().moves;
   statistics_.added += repairer.report().added;
   return status;

@@ -13,6 +13,7 @@
 #include "core/base/run_context.h"
 #include "core/refine/refine.h"
 #include "core/simplex/simplices.h"
+#include "core/sliver/known_cosines.h"
 #include "core/sliver/repair.h"
 #include "core/sliver/triangulation.h"
 #include "core/sliver/vertex_carrier.h"
@@ -28,6 +29,7 @@ struct SliverStatistics {
   std::array<uint64_t, kSliverReasons> left_by{};
   std::vector<LeftSliver> flattest_left;
   uint64_t operations = 0;  // of Repair
+  uint64_t measured = 0;    // tetrahedra, to find slivers and the worst shapes
   bool is_asked = false;    // whether a mesh was to be repaired or pumped
   uint64_t moves = 0;
   uint64_t added = 0;
@@ -56,8 +58,8 @@ class SliverStage {
   //
   // Shapes:     moved: vertices below its size that move are set in it.
   // REQUIRES:   the structure is refined for criteria.criteria; is_fixed has an entry for each of its vertices.
-  // Complexity: O(m) the first time; then O(1) for each vertex added since and each sliver, and a look at every
-  //             simplex.
+  // Complexity: O(m) the first time, in a domain with surfaces each time; then O(1) for each vertex added since and
+  //             each sliver.
   // Errors:     RESOURCE_EXHAUSTED (max_vertices, memory of the context), CANCELLED, DEADLINE_EXCEEDED; all stays
   //             usable.
   // Threads:    uses `threads` for the stars that the triangulation is made of.
@@ -83,11 +85,14 @@ class SliverStage {
   }
 
   // Memory of the stage. Unit: bytes.
-  uint64_t MemoryBytes() const { return triangulation_.has_value() ? triangulation_->MemoryBytes() : 0; }
+  uint64_t MemoryBytes() const {
+    return triangulation_.has_value() ? triangulation_->MemoryBytes() + cosines_.MemoryBytes() : 0;
+  }
   bool HasTriangulation() const { return triangulation_.has_value(); }
   // Drops the triangulation, and the slivers that were left. To be called when the structure changes without Repair.
   void Forget() {
     triangulation_.reset();
+    cosines_ = {};
     statistics_.slivers_left = 0;
     statistics_.left_by = {};
     statistics_.flattest_left.clear();
@@ -101,6 +106,7 @@ class SliverStage {
                                                int threads, RunContext& context);
 
   std::optional<Triangulation<D>> triangulation_;
+  KnownCosines cosines_;  // of its simplices
   SliverStatistics statistics_;
 };
 
