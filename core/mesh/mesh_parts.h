@@ -1,4 +1,4 @@
-// Parts of a mesh in the numbers of its owner: simplices that go, cells that are shown.
+// Parts of a mesh in the numbers of its owner: cells that are shown.
 #ifndef WELLSPACE_CORE_MESH_MESH_PARTS_H_
 #define WELLSPACE_CORE_MESH_MESH_PARTS_H_
 
@@ -9,41 +9,8 @@
 #include "core/cell/polytope.h"
 #include "core/input/frame.h"
 #include "core/mesh/mesh.h"
-#include "core/simplex/quality.h"
 
 namespace wellspace::core {
-
-// Two ways to compute the quality of a simplex differ by less.
-inline constexpr double kWorstTolerance = 1e-9;
-
-// Removes from `mesh` the simplices all of whose vertices `is_among` has; point_of(index) are its
-// vertices as they were computed. Returns whether one of them may have been the worst.
-//
-// Complexity: one pass over the simplices.
-// Errors:     none.
-template <int D, typename PointOf>
-bool DropSimplicesAmong(const std::vector<bool>& is_among, PointOf point_of, Mesh& mesh) {
-  bool worst_has_gone = false;
-  const size_t size = mesh.simplices.size();
-  size_t kept = 0;
-  for (size_t at = 0; at < size; at += D + 1) {
-    const uint32_t* corners = &mesh.simplices[at];
-    if (!std::all_of(corners, corners + D + 1, [&](uint32_t vertex) { return is_among[vertex]; })) {
-      std::copy_n(corners, D + 1, &mesh.simplices[kept]);
-      kept += D + 1;
-      continue;
-    }
-    Simplex<D> simplex;
-    for (int k = 0; k <= D; ++k) {
-      simplex[k] = point_of(corners[k]);
-    }
-    worst_has_gone = worst_has_gone ||
-                     RadiusEdgeRatio<D>(simplex) >= mesh.statistics.max_radius_edge * (1 - kWorstTolerance) ||
-                     Angles<D>(simplex).min_deg <= mesh.statistics.min_angle_deg * (1 + kWorstTolerance);
-  }
-  mesh.simplices.resize(kept);
-  return worst_has_gone;
-}
 
 // The cell of vertex `vertex`, clipped at `clip_radius`, both as the computation has them; index_of(VertexId) are the
 // numbers of the mesh's owner.

@@ -29,6 +29,7 @@ void SetSliverFigures(const SliverStatistics& slivers, MeshStatistics& statistic
   statistics.slivers_left_by = slivers.left_by;
   statistics.flattest_left = slivers.flattest_left;
   statistics.sliver_operations = slivers.operations;
+  statistics.simplices_measured = slivers.measured;
   statistics.sliver_moves = slivers.moves;
   statistics.sliver_vertices = slivers.added;
   statistics.weighted_vertices = slivers.weighted;

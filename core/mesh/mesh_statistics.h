@@ -74,6 +74,7 @@ struct MeshStatistics {
   std::array<uint64_t, kSliverReasons> slivers_left_by{};  // by SliverReason; together slivers_left
   std::vector<LeftSliver> flattest_left;                   // of these at most kMostNamedSlivers, flattest first
   uint64_t sliver_operations = 0;                          // tetrahedra that the repair measured, or held a vertex to
+  uint64_t simplices_measured = 0;                         // to find slivers, and the worst shapes of a repaired mesh
   uint64_t sliver_moves = 0;                               // of vertices
   uint64_t sliver_vertices = 0;                            // added against them
   uint64_t weighted_vertices = 0;                          // by pumping

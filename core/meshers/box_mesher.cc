@@ -135,7 +135,8 @@ absl::StatusOr<SortedCloud<D>> BoxMesher<D>::SortAndBuild(const MeshParameters& 
 
 template <int D>
 uint64_t BoxMesher<D>::OtherBytes() const {
-  uint64_t bytes = repairs_.MemoryBytes();
+  uint64_t bytes = repairs_.MemoryBytes() + facet_simplices_.size() * sizeof(uint32_t) +
+                   (star_rows_.has_value() ? star_rows_->MemoryBytes() : 0);
   if constexpr (D >= 3) {
     bytes += slivers_.MemoryBytes();
   }
@@ -218,6 +219,8 @@ bool BoxMesher<D>::MakesByStage() const {
 
 template <int D>
 absl::StatusOr<typename BoxMesher<D>::Made> BoxMesher<D>::MakeSimplices(int threads, RunContext& context) {
+  followed_ = Followed::kNot;
+  star_rows_.reset();
   if constexpr (D >= 3) {
     if (MakesByStage()) {
       WELLSPACE_ASSIGN_OR_RETURN(
@@ -233,13 +236,14 @@ absl::StatusOr<typename BoxMesher<D>::Made> BoxMesher<D>::MakeSimplices(int thre
 
 template <int D>
 absl::Status BoxMesher<D>::Describe(Mesh& mesh, std::span<const uint32_t> /*faces*/, int threads,
-                                    const RunContext& context) const {
+                                    const RunContext& context) {
   WELLSPACE_ASSIGN_OR_RETURN(
       BoxBoundary boundary,
       FindBoxBoundary({mesh.domain_low, mesh.domain_high, mesh.points, mesh.simplices}, threads, context));
   mesh.vertex_tags = std::move(boundary.vertex_tags);
   mesh.facets = std::move(boundary.facets);
   mesh.boundary = std::move(boundary.parts);
+  facet_simplices_ = std::move(boundary.simplices);
   mesh.regions = {WholeBox()};
   mesh.vertex_origins.assign(structure_.vertex_count(), kSteinerOrigin);
   const auto origins = mesh.vertex_origins.begin();
@@ -247,18 +251,21 @@ absl::Status BoxMesher<D>::Describe(Mesh& mesh, std::span<const uint32_t> /*face
   numbering_.ForEachImage([&](VertexId v, uint32_t number) {
     origins[number] = std::popcount(structure_.faces(v)) < D ? kSteinerOrigin : kCornerOrigin;
   });
-  repairs_.ForEachAdded([&](VertexId v) { origins[Index(v)] = kRepairOrigin; });
+  repairs_.ForEachAdded(0, [&](VertexId v) { origins[Index(v)] = kRepairOrigin; });
   const auto& input_vertex = numbering_.input_vertex();
   for (size_t i = input_vertex.size(); i > 0; --i) {
     origins[input_vertex[i - 1]] = static_cast<uint32_t>(i - 1);
   }
+  known_inputs_ = input_vertex.size();
   return absl::OkStatus();
 }
 
 template <int D>
 void BoxMesher<D>::NoteMade(Mesh& mesh) {
-  // Ascending: it is the same number.
-  repairs_.TakeMoved([&](VertexId v) { mesh.moved_vertices.push_back(numbering_.OutputIndex(v)); });
+  for (const VertexId v : repairs_.TakeMoved()) {
+    mesh.moved_vertices.push_back(numbering_.OutputIndex(v));  // ascending: it is the same number
+  }
+  followed_ = pumps_ ? Followed::kNot : MakesByStage() ? Followed::kByStage : Followed::kByStars;
 }
 
 template <int D>

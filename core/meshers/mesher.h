@@ -137,10 +137,13 @@ class Mesher {
   virtual absl::StatusOr<Mesh> Extract(int threads, RunContext& context) = 0;
 
   // Brings `mesh`, the last that Extract or Update made, up to date: replaces the simplices around the vertices added
-  // since, and moves those that have moved. The simplices are those that Extract would give, in another order.
+  // since, and moves those that have moved. The simplices are those that Extract would give: in its order where
+  // slivers are repaired, elsewhere first those that have stayed, in their order. A mesh that has points, weights,
+  // simplices and statistics alone gets the rest anew.
   //
-  // Complexity: O(1) for each vertex added, and one pass over the indices of the mesh; with pump_weights, and in a
-  //             domain, as Extract.
+  // Complexity: O(1) for each vertex added or moved, a move of the rows behind the first that changes, and a look at
+  //             the facets of the box. One pass over the simplices besides, where slivers are not repaired: the first
+  //             time, and if the worst simplex has gone. With pump_weights, and in a domain, as Extract.
   // Errors:     as Extract; INVALID_ARGUMENT for another mesh. On an error `mesh` is unchanged.
   virtual absl::Status Update(Mesh& mesh, int threads, RunContext& context) = 0;
 

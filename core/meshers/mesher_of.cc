@@ -13,7 +13,6 @@
 #include "core/base/thread_team.h"
 #include "core/estimate/estimate.h"
 #include "core/input/separation.h"
-#include "core/mesh/mesh_parts.h"
 #include "core/mesh/name_parts.h"
 #include "core/meshers/mesh_estimate.h"
 #include "core/meshers/mesher_checks.h"
@@ -224,52 +223,51 @@ template <typename Domain>
 absl::Status MesherOf<Domain>::Update(Mesh& mesh, int threads, RunContext& context) {
   WELLSPACE_RETURN_IF_ERROR(CheckRefined(is_refined_, threads));
   WELLSPACE_RETURN_IF_ERROR(CheckLastMesh(mesh, D, figures_.extracted_vertices, figures_.extracted_simplices));
-  if (MakesAnew(mesh)) {
+  WELLSPACE_ASSIGN_OR_RETURN(const std::optional<Changes> changes, FindChanges(mesh, threads, context));
+  if (!changes.has_value()) {
     WELLSPACE_ASSIGN_OR_RETURN(mesh, Extract(threads, context));
     return absl::OkStatus();
   }
-  context.EnterPhase(Phase::kSimplices);
-  numbering_.Extend(structure_.vertex_count());
-  WELLSPACE_ASSIGN_OR_RETURN(
-      const std::vector<VertexId> changed,
-      ChangedVertices<D>(structure_, VertexId{static_cast<uint32_t>(figures_.extracted_vertices)}, context));
-  WELLSPACE_ASSIGN_OR_RETURN(
-      const Simplices simplices,
-      ComputeSimplicesAmong<D>(structure_, changed, numbering_.output_index(), threads, context));
-  WELLSPACE_ASSIGN_OR_RETURN(const HugeVector<double> added,
-                             numbering_.PointsFrom(structure_, frame_, figures_.extracted_vertices, context));
-  mesh.points.insert(mesh.points.end(), added.begin(), added.end());
-  std::vector<bool> has_changed(structure_.vertex_count(), false);
-  for (const VertexId v : changed) {
-    has_changed[numbering_.OutputIndex(v)] = true;
-  }
-  const bool worst_has_gone = DropSimplicesAmong<D>(
-      has_changed, [this](uint32_t v) -> const Point<D>& { return structure_.point(numbering_.VertexOf(v)); }, mesh);
-  mesh.simplices.insert(mesh.simplices.end(), simplices.indices.begin(), simplices.indices.end());
-  mesh.input_vertex = numbering_.input_vertex();
-  mesh.moved_vertices.clear();  // else the mesh is extracted anew
-  if (const absl::Status described = Describe(mesh, {}, threads, RunContext()); !described.ok()) {
-    std::abort();  // that context cannot have been cancelled
+  // From here on nothing fails.
+  const uint64_t old_vertices = mesh.vertex_count();
+  SpliceRows<uint32_t>(D + 1, changes->simplices.edits, changes->simplices.added, mesh.simplices);
+  mesh.points.insert(mesh.points.end(), changes->points.begin(), changes->points.end());
+  MovePoints(mesh);
+  const HugeVector<uint32_t>& inputs = numbering_.input_vertex();
+  if (changes->has_labels) {
+    const auto known_inputs = static_cast<std::ptrdiff_t>(mesh.input_vertex.size());
+    mesh.input_vertex.insert(mesh.input_vertex.end(), inputs.begin() + known_inputs, inputs.end());
+    UpdateLabels(changes->simplices, old_vertices, mesh);
+  } else {
+    mesh.input_vertex = inputs;
+    if (const absl::Status described = Describe(mesh, {}, threads, RunContext()); !described.ok()) {
+      std::abort();  // that context cannot have been cancelled
+    }
   }
   NameParts(names_, mesh);
-  UpdateQuality(simplices, worst_has_gone, mesh);
-  figures_.star_queries.Add(simplices.counters);
+  UpdateQuality(changes->simplices, mesh);
   context.EnterPhase(Phase::kDone);
-  figures_.simplices_seconds += absl::ToDoubleSeconds(context.TimeIn(Phase::kSimplices));
+  if (!MakesByStage()) {
+    figures_.simplices_seconds += absl::ToDoubleSeconds(context.TimeIn(Phase::kSimplices));
+  }
   Finish(mesh);
   return absl::OkStatus();
 }
 
 // Sets the worst shape of the simplices, some of which have been added.
 template <typename Domain>
-void MesherOf<Domain>::UpdateQuality(const Simplices& added, bool worst_has_gone, Mesh& mesh) const {
-  if (worst_has_gone) {
+void MesherOf<Domain>::UpdateQuality(const SimplexChanges& changes, Mesh& mesh) const {
+  MeshStatistics& statistics = mesh.statistics;
+  if (changes.worst == SimplexChanges::Worst::kUnknown) {
     const QualityReport report = MeasureQuality({D, mesh.points, mesh.simplices});
-    mesh.statistics.max_radius_edge = report.max_radius_edge;
-    mesh.statistics.min_angle_deg = report.min_angle_deg;
+    statistics.max_radius_edge = report.max_radius_edge;
+    statistics.min_angle_deg = report.min_angle_deg;
+  } else if (changes.worst == SimplexChanges::Worst::kOfAll) {
+    statistics.max_radius_edge = changes.max_radius_edge;
+    statistics.min_angle_deg = changes.min_angle_deg;
   } else {
-    mesh.statistics.max_radius_edge = std::max(mesh.statistics.max_radius_edge, added.max_radius_edge);
-    mesh.statistics.min_angle_deg = std::min(mesh.statistics.min_angle_deg, added.min_angle_deg);
+    statistics.max_radius_edge = std::max(statistics.max_radius_edge, changes.max_radius_edge);
+    statistics.min_angle_deg = std::min(statistics.min_angle_deg, changes.min_angle_deg);
   }
 }
 

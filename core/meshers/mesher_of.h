@@ -26,6 +26,7 @@
 #include "core/refine/criteria.h"
 #include "core/refine/plane/planar_domain.h"
 #include "core/refine/refine.h"
+#include "core/simplex/row_edits.h"
 #include "core/simplex/simplices.h"
 #include "core/tree/segment_lists.h"
 #include "core/voronoi/query_structure.h"
@@ -71,6 +72,13 @@ class MesherOf : public Mesher {
     Simplices simplices;
     HugeVector<double> weights = {};  // by output index, in the structure's unit; empty where all are zero
     HugeVector<uint32_t> faces = {};  // by simplex: the face that it lies in; empty where there are none
+  };
+
+  // The changes of a mesh since it was made.
+  struct Changes {
+    SimplexChanges simplices;
+    HugeVector<double> points = {};  // of the vertices that have been added
+    bool has_labels = false;         // whether the mesh has inputs, origins and boundary; else they are made anew
   };
 
   // Builds the tree over the points of `cloud`, which has the rest then, and `segments`; refuses points that are too
@@ -154,16 +162,24 @@ class MesherOf : public Mesher {
 
   // Numbers the vertices there are for the mesh.
   virtual void ExtendNumbers() { numbering_.Extend(structure_.vertex_count()); }
-  // Whether `mesh`, the last, has to be made anew, and cannot be changed where vertices have been added.
-  virtual bool MakesAnew(const Mesh& mesh) const = 0;
+  // The changes that bring the simplices of `mesh`, the last, up to date; none where it has to be made anew. Once they
+  // are found, they are made.
+  virtual absl::StatusOr<std::optional<Changes>> FindChanges(const Mesh& /*mesh*/, int /*threads*/,
+                                                             RunContext& /*context*/) {
+    return std::nullopt;
+  }
   // Whether MakeSimplices does another stage's work, whose time is counted there.
   virtual bool MakesByStage() const { return false; }
   virtual absl::StatusOr<Made> MakeSimplices(int threads, RunContext& context) = 0;
   // Sets origins, boundary and regions of a mesh, of whose simplices `faces` are known.
   virtual absl::Status Describe(Mesh& mesh, std::span<const uint32_t> faces, int threads,
-                                const RunContext& context) const = 0;
+                                const RunContext& context) = 0;
   // Notes that a mesh has been made of all vertices, and lists in it the vertices that have moved since the last one.
   virtual void NoteMade(Mesh& /*mesh*/) {}
+  // Of a mesh whose simplices have been brought up to date, and to which vertices from number `old_vertices` on have
+  // been added: moves those that have moved since the last one, and lists them; then brings labels up to date.
+  virtual void MovePoints(Mesh& /*mesh*/) {}
+  virtual void UpdateLabels(const SimplexChanges& /*changes*/, uint64_t /*old_vertices*/, Mesh& /*mesh*/) {}
   // Sets the statistics of this kind of domain and of its inputs, and adds to the cost of simplices.
   virtual void AddStatistics(const Mesh& mesh, MeshStatistics& statistics, QueryCounters& stars) const = 0;
 
@@ -174,7 +190,7 @@ class MesherOf : public Mesher {
                                               const RunContext& context) const;
   absl::StatusOr<uint64_t> PredictVertices(const MeshCriteria<D>& criteria, const RunContext& context) const;
   void NoteAdded(uint32_t count_before);
-  void UpdateQuality(const Simplices& added, bool worst_has_gone, Mesh& mesh) const;
+  void UpdateQuality(const SimplexChanges& changes, Mesh& mesh) const;
   void Finish(Mesh& mesh);
 
   bool is_refined_ = false;

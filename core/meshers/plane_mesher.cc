@@ -292,7 +292,7 @@ absl::StatusOr<PlaneMesher::Made> PlaneMesher::MakeSimplices(int threads, RunCon
 }
 
 absl::Status PlaneMesher::Describe(Mesh& mesh, std::span<const uint32_t> faces, int /*threads*/,
-                                   const RunContext& context) const {
+                                   const RunContext& context) {
   WELLSPACE_RETURN_IF_ERROR(SetOrigins(*planar_, numbering_, mesh, context));
   WELLSPACE_RETURN_IF_ERROR(SetBoundary(*planar_, made_->chains, numbering_, mesh, context));
   WELLSPACE_RETURN_IF_ERROR(SetRegions(*planar_, faces, mesh, context));

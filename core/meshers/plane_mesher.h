@@ -61,10 +61,8 @@ class PlaneMesher final : public MesherOf<PlaneDomain> {
   void ForgetMade() override { made_.reset(); }
   absl::StatusOr<bool> Conform(const MeshParameters& parameters, RunContext& context) override;
   void NoteAddedFrom(uint32_t first) override;
-  bool MakesAnew(const Mesh& /*mesh*/) const override { return true; }
   absl::StatusOr<Made> MakeSimplices(int threads, RunContext& context) override;
-  absl::Status Describe(Mesh& mesh, std::span<const uint32_t> faces, int threads,
-                        const RunContext& context) const override;
+  absl::Status Describe(Mesh& mesh, std::span<const uint32_t> faces, int threads, const RunContext& context) override;
   void AddStatistics(const Mesh& mesh, MeshStatistics& statistics, QueryCounters& stars) const override;
 
   absl::Status NumberPoints(const DomainCloud& made, std::span<const double> points, const RunContext& context);

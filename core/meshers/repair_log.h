@@ -34,7 +34,7 @@ class RepairLog {
                       Carrier& carrier, const RepairCriteria& criteria, const MeshParameters& parameters, uint64_t made,
                       RunContext& context) {
     is_given_.resize(structure.vertex_count(), false);
-    moved_.resize(made, false);
+    moved_.GrowTo(made);
     const uint64_t moves = stage.statistics().moves;
     const uint32_t refined = structure.vertex_count();
     std::vector<bool> kept;
@@ -46,7 +46,9 @@ class RepairLog {
         stage.Repair(structure, refinement, carrier, parameters.keep_vertices ? kept : is_given_, criteria, moved_,
                      parameters.threads, context);
     is_given_.resize(structure.vertex_count(), false);
-    added_.emplace_back(refined, structure.vertex_count());
+    if (structure.vertex_count() > refined) {
+      added_.emplace_back(refined, structure.vertex_count());
+    }
     has_moved_ = has_moved_ || stage.statistics().moves > moves;
     context.SetVertices(structure.vertex_count());
     return status;
@@ -55,33 +57,29 @@ class RepairLog {
   // Whether a vertex has moved since the last mesh.
   bool has_moved() const { return has_moved_; }
 
-  // Calls f(v) for the vertices that repair has added.
+  // Calls f(v) for the vertices from `from` on that repair has added.
+  //
+  // Complexity: O(these, and repairs that have added some of them).
   template <typename F>
-  void ForEachAdded(F f) const {
-    for (const auto& [first, end] : added_) {
-      for (uint32_t v = first; v < end; ++v) {
+  void ForEachAdded(uint32_t from, F f) const {
+    for (auto range = added_.rbegin(); range != added_.rend() && range->second > from; ++range) {
+      for (uint32_t v = std::max(from, range->first); v < range->second; ++v) {
         f(VertexId{v});
       }
     }
   }
 
-  // Calls f(v) for the vertices of the last mesh that have moved since, ascending, and forgets them: a mesh is made.
-  template <typename F>
-  void TakeMoved(F f) {
-    for (uint32_t v = 0; v < moved_.size(); ++v) {
-      if (moved_[v]) {
-        f(VertexId{v});
-      }
-    }
+  // Returns the vertices of the last mesh that have moved since, ascending, and forgets them: a mesh is made.
+  std::vector<VertexId> TakeMoved() {
     has_moved_ = false;
-    moved_.clear();
+    return moved_.Take();
   }
 
-  uint64_t MemoryBytes() const { return moved_.size() / 8; }
+  uint64_t MemoryBytes() const { return moved_.MemoryBytes(); }
 
  private:
   std::vector<bool> is_given_;
-  std::vector<bool> moved_;                           // by vertex, of those of the last mesh: since that
+  MovedVertices moved_;                               // of those of the last mesh: since that
   std::vector<std::pair<uint32_t, uint32_t>> added_;  // by each repair: first, and end
   bool has_moved_ = false;
 };

@@ -456,7 +456,7 @@ absl::StatusOr<SpaceMesher::Made> SpaceMesher::MakeSimplices(int threads, RunCon
 }
 
 absl::Status SpaceMesher::Describe(Mesh& mesh, std::span<const uint32_t> faces, int /*threads*/,
-                                   const RunContext& context) const {
+                                   const RunContext& context) {
   mesh.points.resize(3 * size_t{meshed_count_});
   const QualityReport quality = MeasureQuality({3, mesh.points, mesh.simplices});
   mesh.statistics.max_radius_edge = quality.max_radius_edge;
@@ -466,7 +466,7 @@ absl::Status SpaceMesher::Describe(Mesh& mesh, std::span<const uint32_t> faces, 
   mesh.ridges = made_->ridges;
   mesh.vertex_tags.assign(made_->boundary.vertex_tags.begin(), made_->boundary.vertex_tags.begin() + meshed_count_);
   mesh.vertex_origins.assign(meshed_count_, kSteinerOrigin);
-  repairs_.ForEachAdded([&](VertexId v) {
+  repairs_.ForEachAdded(0, [&](VertexId v) {
     if (const uint32_t number = numbering_.OutputIndex(v); number < meshed_count_) {
       mesh.vertex_origins[number] = kRepairOrigin;
     }
@@ -502,11 +502,11 @@ absl::Status SpaceMesher::Describe(Mesh& mesh, std::span<const uint32_t> faces, 
 }
 
 void SpaceMesher::NoteMade(Mesh& mesh) {
-  repairs_.TakeMoved([&](VertexId v) {
+  for (const VertexId v : repairs_.TakeMoved()) {
     if (const uint32_t number = numbering_.OutputIndex(v); number < meshed_count_) {
       mesh.moved_vertices.push_back(number);
     }
-  });
+  }
   std::sort(mesh.moved_vertices.begin(), mesh.moved_vertices.end());
   last_count_ = structure_.vertex_count();
 }

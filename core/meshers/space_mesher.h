@@ -75,10 +75,8 @@ class SpaceMesher final : public MesherOf<SpaceDomain> {
   absl::StatusOr<bool> Conform(const MeshParameters& parameters, RunContext& context) override;
   absl::Status Improve(const MeshParameters& parameters, RunContext& context) override;
   void ExtendNumbers() override;
-  bool MakesAnew(const Mesh& /*mesh*/) const override { return true; }
   absl::StatusOr<Made> MakeSimplices(int threads, RunContext& context) override;
-  absl::Status Describe(Mesh& mesh, std::span<const uint32_t> faces, int threads,
-                        const RunContext& context) const override;
+  absl::Status Describe(Mesh& mesh, std::span<const uint32_t> faces, int threads, const RunContext& context) override;
   void NoteMade(Mesh& mesh) override;
   void AddStatistics(const Mesh& mesh, MeshStatistics& statistics, QueryCounters& stars) const override;
 

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <utility>
 
 #include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
+#include "core/simplex/boundary_facets.h"
 
 namespace wellspace::core {
 namespace {
@@ -16,13 +16,6 @@ namespace {
 constexpr size_t kRowsTogether = 1 << 16;
 
 size_t BlocksOf(size_t rows) { return (rows + kRowsTogether - 1) / kRowsTogether; }
-
-// A facet as it is found: that of `simplex` which is opposite to its vertex number `apex`.
-struct FoundFacet {
-  uint64_t simplex;
-  uint8_t apex;
-  uint8_t face;
-};
 
 template <int D>
 class BoundaryFinder {
@@ -49,7 +42,7 @@ class BoundaryFinder {
       for (size_t v = block * kRowsTogether; v < end; ++v) {
         const FaceMask faces = box_.FacesOf(PointAt<D>(points_, v));
         faces_[v] = faces;
-        tags[v] = faces == 0 ? kNoTag : FaceTag(std::countr_zero(faces));
+        tags[v] = TagOf(faces);
       }
       return context.Check();
     });
@@ -68,23 +61,11 @@ class BoundaryFinder {
           inner += faces[k] == 0 ? 1 : 0;
         }
         if (inner <= 1) {
-          AddFacets(s, faces, found_[block]);
+          AddFacets<D>(s, faces, found_[block]);
         }
       }
       return context.Check();
     });
-  }
-
-  static void AddFacets(size_t simplex, const std::array<FaceMask, D + 1>& faces, std::vector<FoundFacet>& found) {
-    for (int apex = 0; apex <= D; ++apex) {
-      FaceMask shared = static_cast<FaceMask>(~FaceMask{0});
-      for (int k = 0; k <= D; ++k) {
-        shared &= k == apex ? static_cast<FaceMask>(~FaceMask{0}) : faces[k];
-      }
-      if (shared != 0) {
-        found.push_back({simplex, static_cast<uint8_t>(apex), static_cast<uint8_t>(std::countr_zero(shared))});
-      }
-    }
   }
 
   // Puts the facets in the order of their parts.
@@ -103,24 +84,13 @@ class BoundaryFinder {
       boundary.parts.push_back({FaceTag(face), FaceName(face), counts[face]});
     }
     boundary.facets.resize(count * D);
+    boundary.simplices.resize(count);
     for (const std::vector<FoundFacet>& block : found_) {
       for (const FoundFacet& facet : block) {
-        Put(facet, &boundary.facets[next[facet.face]++ * D]);
+        const size_t at = next[facet.face]++;
+        boundary.simplices[at] = static_cast<uint32_t>(facet.simplex);
+        PutFacet<D>(simplices_, facet, &boundary.facets[at * D]);
       }
-    }
-  }
-
-  // Writes the vertices of a facet.
-  void Put(const FoundFacet& facet, uint32_t* out) const {
-    const uint32_t* corners = &simplices_[facet.simplex * (D + 1)];
-    for (int k = 0, at = 0; k <= D; ++k) {
-      if (k != facet.apex) {
-        out[at++] = corners[k];
-      }
-    }
-    // The apex goes to the front by as many exchanges of neighbours as it has vertices before it.
-    if (facet.apex % 2 == 1) {
-      std::swap(out[D - 2], out[D - 1]);
     }
   }
 

@@ -50,6 +50,7 @@ struct BoxBoundary {
   HugeVector<uint32_t> facets;      // rows of `dimension` vertices, part after part
   std::vector<BoundaryPart> parts;  // one for each face, by ascending tag
   HugeVector<int32_t> vertex_tags;  // by vertex: the least tag of a face that it is on, or kNoTag
+  HugeVector<uint32_t> simplices;   // by facet: the row of its simplex
 };
 
 // A mesh of the box from `low` to `high`.

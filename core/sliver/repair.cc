@@ -7,7 +7,6 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
-#include "core/base/thread_team.h"
 #include "core/simplex/quality.h"
 #include "core/sliver/surface_carrier.h"
 
@@ -16,8 +15,7 @@ namespace {
 
 // Where a place may have any angles.
 constexpr double kNoLimit = std::numeric_limits<double>::infinity();
-// In the place of a cosine: below every limit, and at or above it.
-constexpr double kUncounted = -1;
+// In the place of a cosine: at or above every limit.
 constexpr double kNotAdmissible = std::numeric_limits<double>::infinity();
 
 // Sections are those of docs/design/sliver.md that explain a constant, and have its measurements.
@@ -48,8 +46,6 @@ constexpr size_t kMostStar = 128;
 // "Repair", "Work is bounded": a torus at rho = 10 took more than a minute without, and 4 s with them.
 constexpr size_t kMany = 1000;
 constexpr double kFewGone = 0.125;
-// Simplices that one thread measures one after the other.
-constexpr size_t kBlock = 1 << 14;
 // A step that leaves a sliver has to make 1 - cosine, nearly half the angle squared, larger by this. "Repair": it keeps
 // steps from being many; other values have not been measured.
 constexpr double kGain = 1.1;
@@ -60,11 +56,12 @@ bool IsBetter(double cosine, double than) { return 1 - cosine >= kGain * (1 - th
 
 template <VertexCarrier Carrier>
 Repairer<Carrier>::Repairer(Triangulation<3>& triangulation, Carrier& carrier, std::vector<bool>& is_fixed,
-                            const RepairCriteria& criteria, RepairObserver& observer)
+                            const RepairCriteria& criteria, KnownCosines& cosines, RepairObserver& observer)
     : triangulation_(triangulation),
       carrier_(carrier),
       is_fixed_(is_fixed),
       criteria_(criteria),
+      cosines_(cosines),
       observer_(observer),
       flat_cosine_(FlatCosine(criteria.min_dihedral)) {}
 
@@ -112,7 +109,7 @@ absl::Status Repairer<Carrier>::RunPasses(int threads, RunContext& context) {
   for (int at = 0; at < kPasses && !next_.empty() && HasWork(); ++at) {
     const int pass = at + ahead;
     WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(observer_.MemoryBytes() + carrier_.MemoryBytes() +
-                                                  triangulation_.MemoryBytes() + cosine_.size() * sizeof(double) +
+                                                  triangulation_.MemoryBytes() + cosines_.MemoryBytes() +
                                                   next_.size() * sizeof(Sliver)));
     const Effort effort = EffortOf(pass, next_.size());
     const size_t begun = next_.size();
@@ -144,6 +141,11 @@ absl::Status Repairer<Carrier>::RunPasses(int threads, RunContext& context) {
     }
   }
   ExplainLeft();
+  std::vector<SimplexId> slivers;
+  for (const Sliver& sliver : next_) {
+    slivers.push_back(sliver.simplex);
+  }
+  cosines_.EndRun(slivers);
   return absl::OkStatus();
 }
 
@@ -199,26 +201,16 @@ Point<3> Repairer<Carrier>::DrawInBall(const TetrahedronMeasure& measure, bool i
   return p;
 }
 
-// Measures all simplices, and lists the slivers among them.
+// Lists the slivers among all simplices.
 template <VertexCarrier Carrier>
 absl::Status Repairer<Carrier>::FindSlivers(int threads, const RunContext& context) {
-  cosine_.resize(triangulation_.simplex_limit());
-  ThreadTeam team(threads);
-  WELLSPACE_RETURN_IF_ERROR(team.TryForEach((cosine_.size() + kBlock - 1) / kBlock, [&](size_t block) {
-    const size_t end = std::min(cosine_.size(), (block + 1) * kBlock);
-    for (size_t i = block * kBlock; i < end; ++i) {
-      const SimplexId s{static_cast<uint32_t>(i)};
-      cosine_[i] = triangulation_.IsIn(s) ? CountedCosine(triangulation_.Corners(s)) : kUncounted;
-    }
-    return context.Check();
-  }));
+  WELLSPACE_ASSIGN_OR_RETURN(
+      const std::vector<SimplexId> slivers,
+      cosines_.BeginRun(triangulation_, carrier_, flat_cosine_, threads, context, report_.measured));
   NoteSmallestAngle();
   next_.clear();
-  for (size_t i = 0; i < cosine_.size(); ++i) {
-    if (cosine_[i] > flat_cosine_) {
-      const SimplexId s{static_cast<uint32_t>(i)};
-      next_.push_back({s, triangulation_.item(s).vertices});
-    }
+  for (const SimplexId s : slivers) {
+    next_.push_back({s, triangulation_.item(s).vertices});
   }
   return absl::OkStatus();
 }
@@ -229,12 +221,6 @@ bool Repairer<Carrier>::IsThere(const Sliver& sliver) const {
          CosineOf(sliver.simplex) > flat_cosine_;
 }
 
-// The cosine by which a tetrahedron of the triangulation is a sliver or not.
-template <VertexCarrier Carrier>
-double Repairer<Carrier>::CountedCosine(const Simplex<3>& corners) const {
-  return carrier_.IsMeshed(corners) ? FlatnessOf(MeasureTetrahedron(corners)) : kUncounted;
-}
-
 // The cosine of a tetrahedron that a step would make; none if it is not below `limit`, or the criteria do not allow for
 // the tetrahedron. `moved` as for IsAdmissible.
 template <VertexCarrier Carrier>
@@ -243,7 +229,7 @@ std::optional<double> Repairer<Carrier>::Judge(const Simplex<3>& corners, const 
   const TetrahedronMeasure measure = MeasureTetrahedron(corners);
   if constexpr (!Carrier::kMeshesAll) {
     if (!carrier_.IsMeshed(corners)) {
-      return HasShape(measure, carrier_.OutsideRho(corners)) ? std::optional(kUncounted) : std::nullopt;
+      return HasShape(measure, carrier_.OutsideRho(corners)) ? std::optional(kUncountedCosine) : std::nullopt;
     }
   }
   return measure.cosine < limit && IsAdmissible(measure, vertices, moved) ? std::optional(measure.cosine)
@@ -364,7 +350,7 @@ bool Repairer<Carrier>::FailsAtSuspect(const Point<3>& p, VertexId v, double lim
 // Measures new tetrahedra; slivers among them will be looked at.
 template <VertexCarrier Carrier>
 void Repairer<Carrier>::Note(std::span<const SimplexId> created) {
-  cosine_.resize(triangulation_.simplex_limit());
+  cosines_.GrowTo(triangulation_.simplex_limit());
   is_changed_.resize(triangulation_.vertex_count());
   for (const SimplexId s : created) {
     const auto& vertices = triangulation_.item(s).vertices;
@@ -374,7 +360,7 @@ void Repairer<Carrier>::Note(std::span<const SimplexId> created) {
         changed_.push_back(v);
       }
     }
-    cosine_[Index(s)] = CountedCosine(triangulation_.Corners(s));
+    cosines_.Set(s, CountedCosine(carrier_, triangulation_.Corners(s)));
     if (CosineOf(s) > flat_cosine_) {
       next_.push_back({s, vertices});
     }

@@ -17,6 +17,7 @@
 #include "core/refine/criteria.h"
 #include "core/simplex/quality.h"
 #include "core/sliver/ball_draws.h"
+#include "core/sliver/known_cosines.h"
 #include "core/sliver/left_sliver.h"
 #include "core/sliver/tetrahedron.h"
 #include "core/sliver/triangulation.h"
@@ -36,12 +37,13 @@ struct RepairReport {
   static constexpr uint64_t kMostOperations = 20'000;
   static constexpr uint64_t kFreeSlivers = 2'000;
 
-  std::optional<double> min_angle_deg;  // of the meshed tetrahedra, before
+  std::optional<double> min_angle_deg;  // of the meshed tetrahedra, before; for a carrier that does not mesh all
   uint64_t slivers = 0;                 // found
   uint64_t slivers_left = 0;            // that could not be repaired
   uint64_t moves = 0;                   // of vertices; one may move more than once
   uint64_t added = 0;                   // vertices
   uint64_t operations = 0;              // tetrahedra that were measured, or that a vertex was tested against
+  uint64_t measured = 0;                // tetrahedra, to find the first slivers
   // Once Run has succeeded: slivers_left by SliverReason, and at most kMostNamedSlivers of them, flattest first.
   std::array<uint64_t, kSliverReasons> left_by{};
   std::vector<LeftSliver> flattest_left;
@@ -72,8 +74,9 @@ template <VertexCarrier Carrier>
 class Repairer {
  public:
   // Shapes:     is_fixed: by vertex; true where it must not move. One entry is added for each vertex added.
+  //             cosines: of the triangulation, as the last run left them, and told of what has come since.
   Repairer(Triangulation<3>& triangulation, Carrier& carrier, std::vector<bool>& is_fixed,
-           const RepairCriteria& criteria, RepairObserver& observer);
+           const RepairCriteria& criteria, KnownCosines& cosines, RepairObserver& observer);
 
   // Repairs the slivers, and the new ones that this makes. Up to `threads` threads look for the first ones; one
   // thread repairs.
@@ -81,7 +84,7 @@ class Repairer {
   // Guarantees: (1) deterministic, and the same on any number of threads; (2) report().operations is at most
   //             RepairReport::kMostOperations times the slivers found and kFreeSlivers more, and once more the most for
   //             one sliver; (3) the report says of each sliver that is left why.
-  // Complexity: O(1) expected for each sliver, and a look at every simplex.
+  // Complexity: O(1) expected for each sliver, and a measure of each simplex whose cosine is not known.
   // Errors:     RESOURCE_EXHAUSTED (max_vertices, memory of the context), CANCELLED, DEADLINE_EXCEEDED; the invariants
   //             hold all the same.
   // Source:     moves: Tournois, Srinivasan and Alliez 2009, with sampled in the place of followed gradients.
@@ -129,8 +132,7 @@ class Repairer {
   Point<3> DrawInBall(const TetrahedronMeasure& measure, bool is_centre);
   bool IsThere(const Sliver& sliver) const;
   bool MayMove(VertexId v) const { return !is_fixed_[Index(v)] && carrier_.MayMove(v); }
-  double CosineOf(SimplexId s) const { return cosine_[Index(s)]; }
-  double CountedCosine(const Simplex<3>& corners) const;
+  double CosineOf(SimplexId s) const { return cosines_.Of(s); }
   std::optional<double> Judge(const Simplex<3>& corners, const std::array<VertexId, 4>& vertices, VertexId moved,
                               double limit) const;
   bool IsAdmissible(const TetrahedronMeasure& measure, const std::array<VertexId, 4>& vertices, VertexId moved) const;
@@ -143,12 +145,14 @@ class Repairer {
     const auto& vertices = triangulation_.item(s).vertices;
     return vertices[vertices[0] == v ? 1 : 0];
   }
-  // Notes the smallest angle of the meshed tetrahedra, once all are measured.
+  // Notes the smallest angle of the meshed tetrahedra, once all are measured; that of a mesh of all is known.
   void NoteSmallestAngle() {
-    const auto flattest = std::max_element(cosine_.begin(), cosine_.end());
-    if (flattest != cosine_.end() && *flattest > -1) {
-      const SimplexId s{static_cast<uint32_t>(flattest - cosine_.begin())};
-      report_.min_angle_deg = Angles<3>(triangulation_.Corners(s)).min_deg;
+    if constexpr (!Carrier::kMeshesAll) {
+      const auto flattest = std::max_element(cosines_.all().begin(), cosines_.all().end());
+      if (flattest != cosines_.all().end() && *flattest > kUncountedCosine) {
+        const SimplexId s{static_cast<uint32_t>(flattest - cosines_.all().begin())};
+        report_.min_angle_deg = Angles<3>(triangulation_.Corners(s)).min_deg;
+      }
     }
   }
   // Whether place k may be tried: false if the run has been cancelled meanwhile, which RunPasses then says.
@@ -172,12 +176,12 @@ class Repairer {
   Carrier& carrier_;
   std::vector<bool>& is_fixed_;
   const RepairCriteria criteria_;
+  KnownCosines& cosines_;
   RepairObserver& observer_;
   const RunContext* context_ = nullptr;  // valid while it runs
   double flat_cosine_ = 0;               // above it an angle is too small
   RepairReport report_;
   HugeVector<double> nearest_sq_;  // at most the squared distance to the nearest neighbour; for well-spaced only
-  HugeVector<double> cosine_;      // by simplex, of its smallest angle; kUncounted where it is not meshed
   HugeVector<Sliver> next_;        // to be looked at
   BallDraws draws_;
 

@@ -14,7 +14,6 @@
 #include "core/simplex/quality.h"
 #include "core/sliver/pump.h"
 #include "core/sliver/surface_carrier.h"
-#include "core/sliver/tetrahedron.h"
 
 namespace wellspace::core {
 namespace {
@@ -23,8 +22,9 @@ namespace {
 constexpr uint32_t kFewNew = 8;
 // Simplices or vertices between two looks at the context.
 constexpr uint32_t kCheckInterval = 1 << 14;
-// Two ways to compute the quality of a tetrahedron differ by less.
-constexpr double kTolerance = 1e-9;
+// Where more changes are noted than one for so many simplices, the mesh is made anew. Some simplices change again and
+// again.
+constexpr uint32_t kFewChanged = 2;
 
 // Appends simplex `s`, lowest output index first, the others ascending but for an exchange of the last two that keeps
 // it positive.
@@ -80,41 +80,17 @@ absl::Status SortSimplices(uint32_t vertex_count, HugeVector<uint32_t>& indices,
   });
 }
 
-// Whether the simplex may be the worst of all so far in one of the two measures, by a cheaper computation.
-template <int D>
-class WorstSoFar {
- public:
-  bool MayBeWorst(const Simplex<D>& corners) {
-    if constexpr (D == 3) {
-      const TetrahedronMeasure measure = MeasureTetrahedron(corners);
-      const double ratio_sq = measure.radius_sq / measure.edge_sq;
-      const bool may_be = !(measure.cosine < cosine_ - kTolerance && ratio_sq < ratio_sq_ * (1 - kTolerance));
-      cosine_ = std::max(cosine_, measure.cosine);
-      ratio_sq_ = std::max(ratio_sq_, ratio_sq);
-      return may_be;
-    } else {
-      return true;
-    }
-  }
-
- private:
-  double cosine_ = -1;
-  double ratio_sq_ = 0;
-};
-
 // Has structure and refinement follow the triangulation step by step, so that repair may end after any of them.
 template <typename Domain>
 class Follower final : public RepairObserver {
  public:
   Follower(Triangulation<3>& triangulation, QueryStructure<3>& structure, Refinement<Domain>& refinement,
-           std::vector<bool>& moved)
+           MovedVertices& moved)
       : triangulation_(triangulation), structure_(structure), refinement_(refinement), moved_(moved) {}
 
   void VertexMoved(VertexId v) override {
     structure_.MoveVertex(v, triangulation_.point(v));
-    if (Index(v) < moved_.size()) {
-      moved_[Index(v)] = true;
-    }
+    moved_.Note(v);
   }
   void VertexAdded(VertexId v, VertexId near) override { structure_.AddVertex(near, triangulation_.point(v)); }
 
@@ -139,7 +115,7 @@ class Follower final : public RepairObserver {
   Triangulation<3>& triangulation_;
   QueryStructure<3>& structure_;
   Refinement<Domain>& refinement_;
-  std::vector<bool>& moved_;
+  MovedVertices& moved_;
   std::vector<SimplexId> star_;
 };
 
@@ -189,6 +165,7 @@ absl::Status SliverStage<D>::FollowStructure(const QueryStructure<D>& structure,
     triangulation_.reset();
   }
   if (!triangulation_.has_value()) {
+    cosines_ = {};
     WELLSPACE_ASSIGN_OR_RETURN(triangulation_, Triangulate(structure, stars, threads, context));
     return absl::OkStatus();
   }
@@ -204,6 +181,7 @@ absl::Status SliverStage<D>::FollowStructure(const QueryStructure<D>& structure,
     triangulation_->FindCavity(triangulation_->Locate(p, start), p, cavity);
     last = triangulation_->AddVertex();
     triangulation_->Insert(last, p, 0, cavity, created);
+    cosines_.NoteCreated(created);
   }
   return absl::OkStatus();
 }
@@ -211,15 +189,14 @@ absl::Status SliverStage<D>::FollowStructure(const QueryStructure<D>& structure,
 template <int D>
 template <typename Domain, VertexCarrier Carrier>
 absl::Status SliverStage<D>::Repair(QueryStructure<3>& structure, Refinement<Domain>& refinement, Carrier& carrier,
-                                    std::vector<bool>& is_fixed, const RepairCriteria& criteria,
-                                    std::vector<bool>& moved, int threads,
-                                    RunContext& context) requires(D == 3 && Domain::kDimension == 3) {
+                                    std::vector<bool>& is_fixed, const RepairCriteria& criteria, MovedVertices& moved,
+                                    int threads, RunContext& context) requires(D == 3 && Domain::kDimension == 3) {
   const Stopwatch stopwatch(statistics_.seconds, statistics_.star_seconds);
   statistics_.slivers_wanted = true;
   WELLSPACE_RETURN_IF_ERROR(FollowStructure(structure, refinement.stars(), threads, context));
   context.EnterPhase(Phase::kSlivers);
   Follower<Domain> follower(*triangulation_, structure, refinement, moved);
-  Repairer<Carrier> repairer(*triangulation_, carrier, is_fixed, criteria, follower);
+  Repairer<Carrier> repairer(*triangulation_, carrier, is_fixed, criteria, cosines_, follower);
   const absl::Status status = repairer.Run(threads, context);
   if (!Carrier::kMeshesAll && statistics_.moves + statistics_.added == 0 && repairer.report().min_angle_deg) {
     statistics_.min_angle_deg = repairer.report().min_angle_deg;  // tetrahedra that are not meshed have other angles
@@ -229,6 +206,7 @@ absl::Status SliverStage<D>::Repair(QueryStructure<3>& structure, Refinement<Dom
   statistics_.left_by = repairer.report().left_by;
   statistics_.flattest_left = repairer.report().flattest_left;
   statistics_.operations += repairer.report().operations;
+  statistics_.measured += repairer.report().measured;
   statistics_.moves += repairer.report().moves;
   statistics_.added += repairer.report().added;
   return status;
@@ -267,23 +245,64 @@ absl::StatusOr<WeightedSimplices> SliverStage<D>::ToSimplices(const QueryStructu
   const Triangulation<D>& triangulation = pumped.has_value() ? *pumped : *triangulation_;
   Simplices& simplices = out.simplices;
   simplices.indices.reserve(size_t{triangulation.simplex_limit()} * (D + 1));
-  WorstSoFar<D> worst;
+  rows_.Clear();
+  shapes_.Clear(D == 3 ? triangulation.simplex_limit() : 0);
   for (uint32_t i = 0; i < triangulation.simplex_limit(); ++i) {
     if (i % kCheckInterval == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
     }
     const SimplexId s{i};
+    rows_.Push(triangulation.IsIn(s));
     if (!triangulation.IsIn(s)) {
       continue;
     }
     Emit<D>(triangulation, s, output_index, simplices.indices);
-    const Simplex<D> corners = triangulation.Corners(s);
-    if (worst.MayBeWorst(corners)) {
+    if constexpr (D == 3) {
+      shapes_.Add(triangulation, s);
+    } else {
+      const Simplex<D> corners = triangulation.Corners(s);
       simplices.max_radius_edge = std::max(simplices.max_radius_edge, RadiusEdgeRatio<D>(corners));
       simplices.min_angle_deg = std::min(simplices.min_angle_deg, Angles<D>(corners).min_deg);
     }
   }
+  statistics_.measured += rows_.rows();
+  if constexpr (D == 3) {
+    const WorstShapes::Worst worst = shapes_.Find(triangulation);
+    simplices.max_radius_edge = worst.max_radius_edge;
+    simplices.min_angle_deg = worst.min_angle_deg;
+  }
+  if (triangulation_.has_value()) {
+    triangulation_->journal().Begin(triangulation_->simplex_limit() / kFewChanged);
+  }
   return out;
+}
+
+template <int D>
+absl::StatusOr<std::optional<SimplexChanges>> SliverStage<D>::Update(std::span<const uint32_t> output_index,
+                                                                     RunContext& context) requires(D == 3) {
+  const Stopwatch stopwatch(statistics_.seconds, statistics_.star_seconds);
+  context.EnterPhase(Phase::kSlivers);
+  WELLSPACE_RETURN_IF_ERROR(context.Check());
+  Triangulation<3>& triangulation = *triangulation_;
+  if (!triangulation.journal().is_whole()) {
+    return std::nullopt;
+  }
+  const std::vector<uint32_t> changed = triangulation.journal().Sorted();
+  const auto is_in = [&](uint32_t i) { return triangulation.IsIn(SimplexId{i}); };
+  SimplexChanges changes;
+  for (const uint32_t i : changed) {
+    if (is_in(i)) {
+      Emit<3>(triangulation, SimplexId{i}, output_index, changes.added);
+    }
+  }
+  changes.edits = rows_.Change(changed, is_in);
+  statistics_.measured += shapes_.Update(triangulation, changed);
+  const WorstShapes::Worst worst = shapes_.Find(triangulation);
+  changes.worst = SimplexChanges::Worst::kOfAll;
+  changes.max_radius_edge = worst.max_radius_edge;
+  changes.min_angle_deg = worst.min_angle_deg;
+  triangulation.journal().Begin(triangulation.simplex_limit() / kFewChanged);
+  return changes;
 }
 
 template class SliverStage<3>;
@@ -291,9 +310,9 @@ template class SliverStage<4>;
 template class SliverStage<5>;
 template class SliverStage<6>;
 template absl::Status SliverStage<3>::Repair(QueryStructure<3>&, Refinement<SpaceDomain>&, SurfaceCarrier&,
-                                             std::vector<bool>&, const RepairCriteria&, std::vector<bool>&, int,
+                                             std::vector<bool>&, const RepairCriteria&, MovedVertices&, int,
                                              RunContext&);
 template absl::Status SliverStage<3>::Repair(QueryStructure<3>&, BoxRefinement<3>&, BoxCarrier&, std::vector<bool>&,
-                                             const RepairCriteria&, std::vector<bool>&, int, RunContext&);
+                                             const RepairCriteria&, MovedVertices&, int, RunContext&);
 
 }  // namespace wellspace::core

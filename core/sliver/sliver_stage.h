@@ -13,9 +13,13 @@
 #include "core/base/run_context.h"
 #include "core/refine/refine.h"
 #include "core/simplex/simplices.h"
+#include "core/simplex/slot_rows.h"
+#include "core/sliver/known_cosines.h"
+#include "core/sliver/moved_vertices.h"
 #include "core/sliver/repair.h"
 #include "core/sliver/triangulation.h"
 #include "core/sliver/vertex_carrier.h"
+#include "core/sliver/worst_shapes.h"
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {
@@ -28,6 +32,7 @@ struct SliverStatistics {
   std::array<uint64_t, kSliverReasons> left_by{};
   std::vector<LeftSliver> flattest_left;
   uint64_t operations = 0;      // of Repair
+  uint64_t measured = 0;        // tetrahedra, to find slivers and the worst shapes
   bool slivers_wanted = false;  // whether a mesh was to be repaired or pumped
   uint64_t moves = 0;
   uint64_t added = 0;
@@ -52,19 +57,18 @@ template <int D>
 class SliverStage {
  public:
   // Repairs the slivers, and tells structure and refinement of the changes, on an error too. `carrier` says where
-  // vertices may go: the carrier of the domain that is refined. 3-D.
+  // vertices may go: the carrier of the domain that is refined. Vertices that move are noted in `moved`. 3-D.
   //
-  // Shapes:     moved: vertices below its size that move are set in it.
   // REQUIRES:   the structure is refined for criteria.criteria; is_fixed has an entry for each of its vertices.
-  // Complexity: O(m) the first time; then O(1) for each vertex added since and each sliver, and a look at every
-  //             simplex.
+  // Complexity: O(m) the first time, in a domain with surfaces each time; then O(1) for each vertex added since and
+  //             each sliver.
   // Errors:     RESOURCE_EXHAUSTED (max_vertices, memory of the context), CANCELLED, DEADLINE_EXCEEDED; all stays
   //             usable.
   // Threads:    uses `threads` for the stars that the triangulation is made of.
   template <typename Domain, VertexCarrier Carrier>
   absl::Status Repair(QueryStructure<3>& structure, Refinement<Domain>& refinement, Carrier& carrier,
-                      std::vector<bool>& is_fixed, const RepairCriteria& criteria, std::vector<bool>& moved,
-                      int threads, RunContext& context) requires(D == 3 && Domain::kDimension == 3);
+                      std::vector<bool>& is_fixed, const RepairCriteria& criteria, MovedVertices& moved, int threads,
+                      RunContext& context) requires(D == 3 && Domain::kDimension == 3);
 
   // The simplices of the repaired mesh; with `pump`, of its regular triangulation under pumped weights. Order and form
   // of the simplices are independent of the number of threads.
@@ -77,17 +81,34 @@ class SliverStage {
                                                 std::span<const uint32_t> output_index, bool pump, int threads,
                                                 RunContext& context);
 
+  // The changes that bring the simplices of the last ToSimplices without `pump`, or of the last Update, up to date;
+  // none if they are too many. Until it succeeds, ToSimplices has to be called.
+  //
+  // Shapes:     as for ToSimplices.
+  // REQUIRES:   the last ToSimplices or Update has succeeded, without `pump`, and the triangulation has lasted since;
+  //             3-D.
+  // Guarantees: (1) they give what ToSimplices would give, in its order.
+  // Complexity: O(change), and a step for each 2048 simplices.
+  // Errors:     CANCELLED, DEADLINE_EXCEEDED.
+  absl::StatusOr<std::optional<SimplexChanges>> Update(std::span<const uint32_t> output_index,
+                                                       RunContext& context) requires(D == 3);
+
   // Peak memory of the stage, beside the structure and a mesh. Unit: bytes.
   static uint64_t EstimateBytes(uint64_t vertices, uint64_t simplices) {
     return vertices * sizeof(Point<D>) + Triangulation<D>::BuildBytes(vertices, simplices);
   }
 
   // Memory of the stage. Unit: bytes.
-  uint64_t MemoryBytes() const { return triangulation_.has_value() ? triangulation_->MemoryBytes() : 0; }
+  uint64_t MemoryBytes() const {
+    return triangulation_.has_value()
+               ? triangulation_->MemoryBytes() + cosines_.MemoryBytes() + rows_.MemoryBytes() + shapes_.MemoryBytes()
+               : 0;
+  }
   bool HasTriangulation() const { return triangulation_.has_value(); }
   // Drops the triangulation, and the slivers that were left. To be called when the structure changes without Repair.
   void Forget() {
     triangulation_.reset();
+    cosines_ = {};
     statistics_.slivers_left = 0;
     statistics_.left_by = {};
     statistics_.flattest_left.clear();
@@ -101,6 +122,10 @@ class SliverStage {
                                                int threads, RunContext& context);
 
   std::optional<Triangulation<D>> triangulation_;
+  KnownCosines cosines_;  // of its simplices
+  // Of the simplices of the last mesh.
+  SlotRows rows_;
+  WorstShapes shapes_;
   SliverStatistics statistics_;
 };
 

@@ -196,14 +196,15 @@ void Triangulation<D>::StartSearch() {
 
 template <int D>
 SimplexId Triangulation<D>::Allocate() {
-  if (!free_.empty()) {
-    const SimplexId s = free_.back();
-    free_.pop_back();
-    return s;
+  if (free_.empty()) {
+    items_.emplace_back();
+    mark_.push_back(0);
+    free_.push_back(SimplexId{static_cast<uint32_t>(items_.size() - 1)});
   }
-  items_.emplace_back();
-  mark_.push_back(0);
-  return SimplexId{static_cast<uint32_t>(items_.size() - 1)};
+  const SimplexId s = free_.back();
+  free_.pop_back();
+  journal_.Note(Index(s));
+  return s;
 }
 
 template <int D>
@@ -214,6 +215,7 @@ void Triangulation<D>::Free(SimplexId s) {
     known.simplex = kNoSimplex;
   }
   free_.push_back(s);
+  journal_.Note(Index(s));
 }
 
 template <int D>
@@ -403,6 +405,7 @@ void Triangulation<D>::Insert(VertexId v, const Point<D>& p, double weight, cons
 template <int D>
 void Triangulation<D>::Remove(VertexId v, std::vector<SimplexId>& created) {
   Star(v, star_);
+  journal_size_ = journal_.size();
   open_.clear();
   open_keys_.clear();
   saved_.clear();
@@ -574,6 +577,7 @@ void Triangulation<D>::Restore() {
     Free(*it);
   }
   free_.resize(free_.size() - saved_.size());
+  journal_.Rewind(journal_size_);
   for (const auto& [s, beyond_slot, item] : saved_) {
     items_[Index(s)] = item;
     const SimplexId beyond = item.neighbours[item.SlotOf(removed_)];

@@ -17,6 +17,7 @@
 #include "core/geometry/point.h"
 #include "core/sliver/lifted_plane.h"
 #include "core/sliver/link_columns.h"
+#include "core/sliver/simplex_journal.h"
 
 namespace wellspace::core {
 
@@ -177,6 +178,10 @@ class Triangulation {
   // Errors:     none.
   // Source:     gift wrapping: beyond each facet comes the vertex whose ball through the facet is empty of neighbours.
   void Remove(VertexId v, std::vector<SimplexId>& created);
+  // The simplices that have changed. Invariant: one that was and is in, and is not there, has its vertices, and they
+  // their places.
+  SimplexJournal& journal() { return journal_; }
+
   // Undoes the Remove before, after which nothing was changed: simplices get their numbers back.
   void Restore();
 
@@ -237,6 +242,8 @@ class Triangulation {
   HugeVector<SimplexId> simplex_of_;  // by vertex: one of its simplices; kNoSimplex where it is in none
   HugeVector<Item> items_;
   std::vector<SimplexId> free_;
+  SimplexJournal journal_;
+  size_t journal_size_ = 0;         // at the last Remove
   std::vector<KnownPlane> planes_;  // that of s, if it is known, at s modulo kKnownPlanes
 
   // Scratch.

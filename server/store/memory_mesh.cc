@@ -58,7 +58,14 @@ absl::StatusOr<core::Mesh> MemoryMesh::Load(const core::RunContext& context) con
   WELLSPACE_ASSIGN_OR_RETURN(copy.points, Copy(mesh.points, context));
   WELLSPACE_ASSIGN_OR_RETURN(copy.weights, Copy(mesh.weights, context));
   WELLSPACE_ASSIGN_OR_RETURN(copy.simplices, Copy(mesh.simplices, context));
-  return copy;  // Update makes the rest anew
+  // With these Update changes what has changed, and makes them anew without.
+  WELLSPACE_ASSIGN_OR_RETURN(copy.input_vertex, Copy(mesh.input_vertex, context));
+  WELLSPACE_ASSIGN_OR_RETURN(copy.vertex_origins, Copy(mesh.vertex_origins, context));
+  WELLSPACE_ASSIGN_OR_RETURN(copy.vertex_tags, Copy(mesh.vertex_tags, context));
+  WELLSPACE_ASSIGN_OR_RETURN(copy.facets, Copy(mesh.facets, context));
+  copy.boundary = mesh.boundary;
+  copy.regions = mesh.regions;
+  return copy;
 }
 
 absl::StatusOr<std::shared_ptr<const core::Mesh>> MemoryMesh::Whole(const core::RunContext& /*context*/) const {

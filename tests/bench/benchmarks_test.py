@@ -145,5 +145,21 @@ class MicroTest(unittest.TestCase):
             "Star", "Cut", "DecideCut/Word", "DecideCut/Integer", "DecideCut/WideInteger", "DecideCut/BigInteger"]})
 
 
+class EditsTest(unittest.TestCase):
+    def test_measures_every_kind_of_mesh(self):
+        with tempfile.TemporaryDirectory() as folder:
+            out = pathlib.Path(folder) / "edits.json"
+            result = run(BENCH / "edits", "--quick", "--at-most", 200, "--repeat", 1, "--bin", BIN, "--json", out)
+            self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
+            document = json.loads(out.read_text(encoding="utf-8"))
+        self.assertEqual({row["mesh"] for row in document["rows"]},
+                         {"3-D", "3-D, slivers left", "2-D", "domain in the plane"})
+        for row in document["rows"]:
+            self.assertIn(row["points"], (1, 100))
+            for report in row["reports"]:
+                self.assertGreater(report["edit_seconds"], 0, row["mesh"])
+                self.assertGreater(report["vertices"], 0, row["mesh"])
+
+
 if __name__ == "__main__":
     unittest.main()

@@ -268,7 +268,7 @@ TEST_F(StarsOfRefinementTest, GiveTheSimplicesAfterVerticesWereMoved) {
   is_fixed.resize(structure.vertex_count(), false);
   SliverStage<3> stage;
   const RepairCriteria criteria{{.rho = 2}, 15, kMinEdge, 1'000'000};
-  std::vector<bool> moved;
+  MovedVertices moved;
   BoxCarrier carrier;
   const absl::Status repaired = stage.Repair(structure, refinement, carrier, is_fixed, criteria, moved, 1, context);
   ASSERT_TRUE(repaired.ok()) << repaired;
