@@ -50,10 +50,10 @@ struct MarkerConflict {
 // have the same corners; they ascend by their sorted corners; (3) edges ascend, and so do the sides at each.
 struct SurfaceComplex {
   std::vector<Point<3>> points;
-  std::vector<uint32_t> point_of_input;            // by given point
+  std::vector<uint32_t> point_of_input;            // by given point; kNoPoint: outside of the box of a BoxedSurface
   std::vector<std::array<uint32_t, 3>> triangles;  // corners, in the direction that is given
   std::vector<int32_t> markers;                    // by triangle
-  std::vector<uint32_t> sources;                   // by triangle: the first that is given over its corners
+  std::vector<uint32_t> sources;                   // by triangle: the first given over its corners, or kNoSource
   std::vector<std::array<uint32_t, 2>> edges;      // the lower point first
   std::vector<uint32_t> first_side;                // by edge, and one more: where its sides begin in `sides`
   std::vector<TriangleSide> sides;
@@ -63,6 +63,8 @@ struct SurfaceComplex {
   uint64_t conflict_count = 0;
 
   static constexpr size_t kMostConflicts = 1000;
+  static constexpr uint32_t kNoPoint = std::numeric_limits<uint32_t>::max();
+  static constexpr uint32_t kNoSource = std::numeric_limits<uint32_t>::max();  // a side of the box of a BoxedSurface
 
   const Point<3>& Corner(uint32_t triangle, uint32_t k) const { return points[triangles[triangle][k]]; }
   Triangle TriangleAt(uint32_t triangle) const {

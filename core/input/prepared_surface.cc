@@ -8,6 +8,7 @@
 #include "absl/strings/str_format.h"
 #include "core/base/check_at.h"
 #include "core/base/status_macros.h"
+#include "core/features/boxed_surface.h"
 #include "core/features/surface_shape.h"
 #include "core/features/triangle_pairs.h"
 #include "core/input/near_points.h"
@@ -19,6 +20,9 @@ namespace {
 
 // The frame is wider on every side than the surface by so many of its longest side, as it is where it is meshed.
 constexpr double kRoom = 0.5;
+
+// Points may be beyond a box by so many of its longest sides: grids of wider frames are too coarse for the box.
+constexpr double kMostBeyond = 1024;
 
 // The smallest patches that stay, as a share of the diagonal, unless a length is given.
 constexpr double kMinPatchShare = 0.01;
@@ -54,17 +58,7 @@ class Preparer {
  private:
   // Makes the complex, on the scale of the computation.
   absl::Status MakeComplex() {
-    WELLSPACE_ASSIGN_OR_RETURN(Box<3> around, BoxAround<3>(points_, 0, context_));
-    const double room = kRoom * around.LongestSide();
-    if (!(room > 0)) {
-      return absl::InvalidArgumentError("triangles: all corners are one point; expected a surface with an area");
-    }
-    for (int axis = 0; axis < 3; ++axis) {
-      around.low[axis] -= room;
-      around.high[axis] += room;
-    }
-    WELLSPACE_ASSIGN_OR_RETURN(frame_, Frame<3>::Of(around));
-    WELLSPACE_RETURN_IF_ERROR(CheckPoints<3>(frame_, points_, context_));
+    WELLSPACE_RETURN_IF_ERROR(MakeFrame());
     MergedPoints merged;
     if (features_.weld > 0) {
       WELLSPACE_ASSIGN_OR_RETURN(merged, MergeNear<3>(frame_, points_, features_.weld, context_));
@@ -84,7 +78,95 @@ class Preparer {
                                                      " has an area; expected a surface with an area"));
     }
     WELLSPACE_RETURN_IF_ERROR(TakeCleaning());
-    return features_.solids == SolidRule::kWinding ? TakeWrap(merged) : absl::OkStatus();
+    if (features_.solids == SolidRule::kWinding) {
+      return TakeWrap(merged);
+    }
+    return features_.solids == SolidRule::kBox ? TakeBox() : absl::OkStatus();
+  }
+
+  // The frame has room for all points, and for the box.
+  absl::Status MakeFrame() {
+    WELLSPACE_ASSIGN_OR_RETURN(Box<3> around, BoxAround<3>(points_, 0, context_));
+    if (features_.box.has_value()) {
+      WELLSPACE_RETURN_IF_ERROR(CheckBoxOf(*features_.box, around));
+      around.Include(*features_.box);
+    }
+    const double room = kRoom * around.LongestSide();
+    if (!(room > 0)) {
+      return absl::InvalidArgumentError("triangles: all corners are one point; expected a surface with an area");
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+      around.low[axis] -= room;
+      around.high[axis] += room;
+    }
+    WELLSPACE_ASSIGN_OR_RETURN(frame_, Frame<3>::Of(around));
+    WELLSPACE_RETURN_IF_ERROR(CheckPoints<3>(frame_, points_, context_));
+    return features_.box.has_value() ? CheckSides() : absl::OkStatus();
+  }
+
+  // Refuses a box that doubles cannot serve, or that triangles go too far beyond.
+  static absl::Status CheckBoxOf(const Box<3>& box, const Box<3>& of_points) {
+    const double most = kMostBeyond * box.LongestSide();
+    for (int axis = 0; axis < 3; ++axis) {
+      const double beyond = std::max(box.low[axis] - of_points.low[axis], of_points.high[axis] - box.high[axis]);
+      if (beyond > most) {
+        return absl::InvalidArgumentError(absl::StrFormat(
+            "box: points are up to %g beyond it along axis %d; expected at most %g times its longest side, %g; leave "
+            "triangles out that are far from it",
+            beyond, axis, kMostBeyond, box.LongestSide()));
+      }
+    }
+    return Frame<3>::Of(box).status();
+  }
+
+  // Refuses points that are neither on the plane of a side nor far enough from it.
+  absl::Status CheckSides() const {
+    const double least = frame_.MinSeparation() / frame_.scale;
+    for (size_t i = 0; i < points_.size() / 3; ++i) {
+      WELLSPACE_RETURN_IF_ERROR(CheckAt(i, context_));
+      const Point<3> p = PointAt<3>(points_, i);
+      if (!(DistanceSq<3>(p, *features_.box) < least * least)) {
+        continue;
+      }
+      for (int side = 0; side < 6; ++side) {
+        const double distance = features_.box->DistanceToFace(p, side);
+        if (distance > features_.weld && distance < least) {
+          return absl::InvalidArgumentError(absl::StrFormat(
+              "points[%d] = (%.17g, %.17g, %.17g) is only %g from the %s side of axis %d of the box, too close for the "
+              "arithmetic of doubles; expected it on the side, or at least %g away; or weld with that distance",
+              i, p[0], p[1], p[2], distance, side % 2 == 0 ? "low" : "high", side / 2, least));
+        }
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  // Has the parts of triangles in the box and its sides be the complex.
+  absl::Status TakeBox() {
+    if (features_.weld > 0 && !(2 * features_.weld < features_.box->ShortestSide())) {
+      return absl::InvalidArgumentError(absl::StrFormat("weld: %g is as wide as the box, %g; expected a shorter length",
+                                                        features_.weld, features_.box->ShortestSide()));
+    }
+    const Box<3> box{frame_.Scaled(features_.box->low), frame_.Scaled(features_.box->high)};
+    const double weld = features_.weld * frame_.scale;
+    const uint64_t held = PrepareSurfaceBytes(points_.size() / 3, features_.triangle_count(), features_.weld > 0);
+    WELLSPACE_ASSIGN_OR_RETURN(BoxedSurface boxed,
+                               CutAtBox(complex_, box, weld, std::max(weld, frame_.MinSeparation()), held, context_));
+    if (boxed.complex.triangles.empty()) {
+      return absl::InvalidArgumentError(absl::StrCat("triangles: none of the ", features_.triangle_count(),
+                                                     " has a part with an area in the box; expected one, or a cloud"));
+    }
+    complex_ = std::move(boxed.complex);
+    do_meet_in_side_ = boxed.do_meet;
+    report_.moved_points = boxed.moved_points;
+    report_.cut_triangles = boxed.cut_triangles;
+    report_.outside_triangles = boxed.outside_triangles;
+    WELLSPACE_RETURN_IF_ERROR(MeasureComplex());
+    scaled_box_ = box;
+    report_.box = *features_.box;
+    return context_.AllowMemory(2 * held +
+                                PrepareSurfaceBytes(complex_.points.size(), complex_.triangles.size(), false) +
+                                SurfaceIndex::Bytes(complex_.triangles.size()));
   }
 
   // Has a wrap be the complex; given points stay points of it. `given`: on the scale of the computation.
@@ -146,6 +228,22 @@ class Preparer {
     if (cleaning.equal_triangles > 0) {
       report_.equal_at = {.at = frame_.Unscaled(cleaning.lowest_equal.at), .triangles = {cleaning.lowest_equal.source}};
     }
+    WELLSPACE_RETURN_IF_ERROR(MeasureComplex());
+    // The corners of all given triangles, also of those that cleaning has dropped.
+    std::vector<bool> is_corner(complex_.points.size());
+    for (size_t i = 0; i < features_.corners.size(); ++i) {
+      WELLSPACE_RETURN_IF_ERROR(CheckAt(i, context_));
+      is_corner[complex_.point_of_input[features_.corners[i]]] = true;
+    }
+    for (size_t i = 0; i < complex_.point_of_input.size(); ++i) {
+      WELLSPACE_RETURN_IF_ERROR(CheckAt(i, context_));
+      report_.loose_points += is_corner[complex_.point_of_input[i]] ? 0 : 1;
+    }
+    return absl::OkStatus();
+  }
+
+  // Counts the points and triangles of the complex, and finds the box of their corners.
+  absl::Status MeasureComplex() {
     report_.triangles = complex_.triangles.size();
     std::vector<bool> is_used(complex_.points.size());
     const Point<3>& first = complex_.Corner(0, 0);
@@ -159,16 +257,6 @@ class Preparer {
     }
     report_.points = static_cast<uint64_t>(std::count(is_used.begin(), is_used.end(), true));
     report_.box = {frame_.Unscaled(scaled_box_.low), frame_.Unscaled(scaled_box_.high)};
-    // The corners of all given triangles, also of those that cleaning has dropped.
-    std::vector<bool> is_corner(complex_.points.size());
-    for (size_t i = 0; i < features_.corners.size(); ++i) {
-      WELLSPACE_RETURN_IF_ERROR(CheckAt(i, context_));
-      is_corner[complex_.point_of_input[features_.corners[i]]] = true;
-    }
-    for (size_t i = 0; i < complex_.point_of_input.size(); ++i) {
-      WELLSPACE_RETURN_IF_ERROR(CheckAt(i, context_));
-      report_.loose_points += is_corner[complex_.point_of_input[i]] ? 0 : 1;
-    }
     return absl::OkStatus();
   }
 
@@ -201,8 +289,9 @@ class Preparer {
     constexpr size_t kFew = 5;
     std::vector<uint32_t> given;
     for (const TriangleSide side : complex_.SidesAt(edge)) {
-      if (given.size() < kFew) {
-        given.push_back(complex_.sources[TriangleOf(side)]);
+      const uint32_t source = complex_.sources[TriangleOf(side)];
+      if (given.size() < kFew && source != SurfaceComplex::kNoSource) {
+        given.push_back(source);
       }
     }
     return given;
@@ -219,8 +308,10 @@ class Preparer {
       if (fault.places.size() < kNamedFaults) {
         Point<3> middle{};
         for (size_t k = 0; k < 3; ++k) {
-          const Point<3>& corner =
-              complex_.points[complex_.point_of_input[features_.corners[3 * size_t{conflict.one} + k]]];
+          const uint32_t input = features_.corners[3 * size_t{conflict.one} + k];
+          const uint32_t point = complex_.point_of_input[input];
+          const Point<3> corner =
+              point == SurfaceComplex::kNoPoint ? frame_.Scaled(PointAt<3>(points_, input)) : complex_.points[point];
           for (int axis = 0; axis < 3; ++axis) {
             middle[axis] += corner[axis] / 3;
           }
@@ -251,9 +342,13 @@ class Preparer {
         fault.places.push_back({.at = frame_.Unscaled(pair.contact.at),
                                 .size = pair.contact.distance / frame_.scale,
                                 .triangles = {complex_.sources[pair.one], complex_.sources[pair.other]}});
+        std::erase(fault.places.back().triangles, SurfaceComplex::kNoSource);
       }
     }
     are_apart_ = meet.count == 0;
+    if (are_apart_ && do_meet_in_side_) {
+      return absl::InternalError("triangles meet in a side of the box, but nowhere else");
+    }
     for (SurfaceFault* const fault : {&meet, &near}) {
       if (fault->count > 0) {
         report_.faults.push_back(std::move(*fault));
@@ -298,7 +393,7 @@ class Preparer {
 
   // Finds the solids, unless faults that have been found keep the surface from bounding them.
   absl::Status TakeSolids(const SurfaceShape& shape) {
-    const bool is_even_odd = features_.solids != SolidRule::kHoles;
+    const bool is_even_odd = !MeshesAllBounded(features_.solids);
     if (is_even_odd && shape.open_edges > 0) {
       AddOpenEdges(shape);
     }
@@ -352,7 +447,8 @@ class Preparer {
   SurfaceComplex& complex_ = prepared_.complex;
   Box<3>& scaled_box_ = prepared_.box;
   SurfaceReport& report_ = prepared_.report;
-  bool are_apart_ = false;  // triangles: none meets another where they share nothing
+  bool are_apart_ = false;        // triangles: none meets another where they share nothing
+  bool do_meet_in_side_ = false;  // triangles, in a side of the box; so it has no sides
 };
 
 }  // namespace
@@ -381,6 +477,20 @@ absl::Status CheckSurfaceFeatures(std::span<const double> points, const SurfaceF
   if (features.resolution > 0 && features.solids != SolidRule::kWinding) {
     return absl::InvalidArgumentError(absl::StrCat("resolution: it is of solids by winding alone, and it is ",
                                                    features.resolution, "; leave it out"));
+  }
+  if (features.box.has_value() != (features.solids == SolidRule::kBox)) {
+    return absl::InvalidArgumentError(features.box.has_value()
+                                          ? "box: it is of solids by box alone; leave it out, or take these"
+                                          : "box: solids by box need one; expected its low corner and its high one");
+  }
+  if (features.box.has_value()) {
+    for (size_t i = 0; i < features.markers.size(); ++i) {
+      if (IsSideMarker(features.markers[i])) {
+        return absl::InvalidArgumentError(absl::StrCat("markers[", i, "]: ", features.markers[i],
+                                                       " is that of a side of the box; expected at least ",
+                                                       int64_t{kFirstSideMarker} + 6));
+      }
+    }
   }
   if (features.keeps_points && features.solids == SolidRule::kWinding) {
     return absl::InvalidArgumentError(

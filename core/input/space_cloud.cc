@@ -110,7 +110,7 @@ class CloudMaker {
     const Solids& solids = domain_->solids();
     std::vector<SolidRole>& roles = domain_->roles();
     for (uint32_t solid = 1; solid < solids.count; ++solid) {
-      roles[solid].is_meshed = features_.solids == SolidRule::kHoles || solids.is_odd[solid];
+      roles[solid].is_meshed = MeshesAllBounded(features_.solids) || solids.is_odd[solid];
     }
     bool has_regions = false;
     std::vector<uint32_t> solid_of_seed;
@@ -261,18 +261,28 @@ class CloudMaker {
         is_used[point] = true;
       }
     }
-    for (uint32_t i : features_.corners) {
-      is_used[complex().point_of_input[i]] = true;  // of triangles that were dropped
+    std::vector<bool> is_corner(complex().point_of_input.size());  // of all given triangles
+    for (const uint32_t i : features_.corners) {
+      is_corner[i] = true;
+      if (const uint32_t point = complex().point_of_input[i]; point != SurfaceComplex::kNoPoint) {
+        is_used[point] = true;  // also of triangles that were dropped
+      }
     }
     first_of_point_.assign(complex().points.size(), kNoFirst);
     input_of_point_.assign(complex().points.size(), kNoFirst);
     for (size_t i = complex().point_of_input.size(); i > 0; --i) {
-      input_of_point_[complex().point_of_input[i - 1]] = static_cast<uint32_t>(i - 1);
+      if (const uint32_t point = complex().point_of_input[i - 1]; point != SurfaceComplex::kNoPoint) {
+        input_of_point_[point] = static_cast<uint32_t>(i - 1);
+      }
     }
     const double least = frame_.MinSeparation();
     for (uint32_t i = 0; i < complex().point_of_input.size(); ++i) {
       WELLSPACE_RETURN_IF_ERROR(CheckAt(i, context_));
       const uint32_t point = complex().point_of_input[i];
+      if (point == SurfaceComplex::kNoPoint) {
+        figures_.dropped_points += is_corner[i] ? 0 : 1;
+        continue;
+      }
       const auto corner = std::lower_bound(curves().corners.begin(), curves().corners.end(), point);
       if (corner != curves().corners.end() && *corner == point) {
         const auto number = static_cast<uint32_t>(corner - curves().corners.begin());
@@ -288,16 +298,29 @@ class CloudMaker {
         const SurfacePoint nearest = *domain_->index().Nearest(complex().points[point]);
         const double distance = std::sqrt(nearest.distance_sq);
         if (distance < least) {
+          const uint32_t source = complex().sources[nearest.triangle];
           return TooCloseError<3>(frame_, complex().points[point], i, distance,
-                                  features_.solids == SolidRule::kWinding
-                                      ? "the surface"
-                                      : absl::StrCat("triangle ", complex().sources[nearest.triangle]));
+                                  features_.solids == SolidRule::kWinding ? "the surface"
+                                  : source == SurfaceComplex::kNoSource   ? "a side of the box"
+                                                                          : absl::StrCat("triangle ", source));
         }
         TakePoint(i, point, {SpacePlace::Kind::kSolid, solid, distance});
       }
     }
     place_of_kept_ = {};
+    TakeOtherCorners();
     return absl::OkStatus();
+  }
+
+  // Takes the corners that are no given points: of a box, and where its edges are crossed.
+  void TakeOtherCorners() {
+    for (uint32_t number = 0; number < curves().corners.size(); ++number) {
+      const uint32_t point = curves().corners[number];
+      if (first_of_point_[point] == kNoFirst) {
+        first_of_point_[point] = static_cast<uint32_t>(first_.size());
+        first_.push_back({frame_.Unscaled(complex().points[point]), {SpacePlace::Kind::kCorner, number, 0}});
+      }
+    }
   }
 
   // Takes given point `input`, which is a point of the complex.
@@ -368,9 +391,10 @@ class CloudMaker {
   }
 
   void AddOnCurve(uint32_t curve, double arc) {
+    const uint32_t input = input_of_point_[curves().PointsOf(curve).front()];  // none: on a side of the box
     first_.push_back({frame_.Unscaled(domain_->PointAt(curve, arc)),
                       {SpacePlace::Kind::kCurve, curve, arc},
-                      input_of_point_[curves().PointsOf(curve).front()]});
+                      input == kNoFirst ? 0 : input});
   }
 
   // Puts vertices on patches that no curve bounds, each as far as can be from those before.
@@ -432,7 +456,7 @@ class CloudMaker {
       names.of_sorted[sorted_of[std::get<3>(order[k])]] = k;
     }
     for (const uint32_t point : complex().point_of_input) {
-      const uint32_t first = first_of_point_[point];
+      const uint32_t first = point == SurfaceComplex::kNoPoint ? kNoFirst : first_of_point_[point];
       const bool is_vertex = first != kNoFirst && domain_->IsMeshedAt(first_[first].place);
       names.of_input.push_back(is_vertex ? names.of_sorted[sorted_of[first]] : kNoFirst);
     }

@@ -29,7 +29,8 @@ absl::Status ValidateSpaceParameters(const MeshParameters& parameters, const Sur
     return absl::InvalidArgumentError("pump_weights: a domain with a surface has no weights; leave it out");
   }
   if (!parameters.domain_low.empty()) {
-    return absl::InvalidArgumentError("domain: a surface bounds what is meshed, and no box; leave one of the two out");
+    return absl::InvalidArgumentError(
+        "domain: a surface bounds what is meshed, or surface.box does with solids by box; leave it out");
   }
   if (parameters.merge_distance > 0) {
     return absl::InvalidArgumentError(absl::StrCat("merge_distance: points of a surface are welded, and it is ",

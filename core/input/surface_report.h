@@ -56,7 +56,8 @@ std::string WordsOf(SurfaceFault::Kind kind);
 // Errors:     INVALID_ARGUMENT always: how many there are, the first place, what would be accepted.
 absl::Status ErrorOf(const SurfaceFault& fault);
 
-// With SolidRule::kWinding `components` and all below it are those of the wrap.
+// With SolidRule::kWinding `components` and all below it are those of the wrap. With SolidRule::kBox `box`, `points`,
+// `triangles`, `components` and all below it are those of the parts in the box and of its sides.
 struct SurfaceReport {
   Box<3> box{};                    // of the triangles' corners
   uint64_t points = 0;             // that triangles have for corners, once they are clean
@@ -67,6 +68,9 @@ struct SurfaceReport {
   uint64_t flat_triangles = 0;     // dropped: without an area
   uint64_t equal_triangles = 0;    // dropped: beyond the first over the same corners
   uint64_t flipped_triangles = 0;  // that go against most of the others around them
+  uint64_t moved_points = 0;       // onto sides of a box, by welding
+  uint64_t cut_triangles = 0;      // at the sides of a box
+  uint64_t outside_triangles = 0;  // dropped: without a part in the box
   double lost_area = 0;            // of solids by winding: of triangles around nothing that is meshed
   // The first of each of these three kinds, by its lowest corner; without triangles, if there is none.
   FaultPlace flat_at;

@@ -50,6 +50,8 @@ struct SurfaceStatistics {
   double deviation_of_facets = 0;    // the largest distance of samples of facets from the surface
   double deviation_of_surface = 0;   // the largest distance of samples of the surface from facets
   double lost_area = 0;              // of triangles around parts that solids by winding lose
+  uint64_t cut_triangles = 0;        // at the sides of the box
+  uint64_t outside_triangles = 0;    // without a part in the box
   std::vector<double> volumes{};     // by region, in the order of Mesh::regions
 };
 

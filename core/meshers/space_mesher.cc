@@ -538,6 +538,8 @@ void SpaceMesher::AddStatistics(const Mesh& mesh, MeshStatistics& statistics, Qu
   surface.deviation_of_facets = made_->deviation_of_facets / frame_.scale;
   surface.deviation_of_surface = made_->deviation_of_surface / frame_.scale;
   surface.lost_area = report.lost_area;
+  surface.cut_triangles = report.cut_triangles;
+  surface.outside_triangles = report.outside_triangles;
   surface.unused_seeds = figures_of_input_.unused_seeds;
   surface.first_unused_seed = figures_of_input_.first_unused_seed;
 }

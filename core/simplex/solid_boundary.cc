@@ -7,12 +7,14 @@
 #include <limits>
 #include <map>
 #include <set>
+#include <string>
 #include <tuple>
 #include <utility>
 
 #include "core/base/cancellable_sort.h"
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
+#include "core/features/boxed_surface.h"
 #include "core/features/solids.h"
 #include "core/geometry/box.h"
 #include "core/geometry/box_tree.h"
@@ -339,6 +341,11 @@ class MarkerFinder {
   std::map<Pair, Between> between_;  // the lower solid first
 };
 
+// The name of the part with a marker, which may be that of a side of the box.
+std::string PartNameOf(int64_t marker) {
+  return IsSideMarker(marker) ? FaceName(static_cast<int>(marker - kFirstSideMarker)) : MarkerName(marker);
+}
+
 // Writes the facets in the order of their parts.
 absl::StatusOr<SolidBoundary> PartsOf(const std::vector<FoundFacet>& found, const std::set<int64_t>& markers,
                                       const SolidMesh& mesh, const RunContext& context) {
@@ -350,7 +357,7 @@ absl::StatusOr<SolidBoundary> PartsOf(const std::vector<FoundFacet>& found, cons
   std::map<int64_t, size_t> part_of;  // by marker
   for (const auto& [tag, marker] : marker_of) {
     part_of[marker] = boundary.parts.size();
-    boundary.parts.push_back({tag, MarkerName(marker), 0});
+    boundary.parts.push_back({tag, PartNameOf(marker), 0});
   }
   for (const FoundFacet& facet : found) {
     ++boundary.parts[part_of.at(facet.marker)].facets;

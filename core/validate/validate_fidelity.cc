@@ -23,6 +23,7 @@
 #include "core/validate/facet_edges.h"
 #include "core/validate/membership.h"
 #include "core/validate/triangle_tree.h"
+#include "core/validate/validate_boxed.h"
 #include "core/validate/wanted_surface.h"
 
 namespace wellspace::core {
@@ -84,6 +85,7 @@ class Comparison {
     WELLSPACE_RETURN_IF_ERROR(TestVolumes());
     WELLSPACE_RETURN_IF_ERROR(TestTags());
     WELLSPACE_RETURN_IF_ERROR(TestEdges());
+    WELLSPACE_RETURN_IF_ERROR(TestBox());
     return std::move(report_);
   }
 
@@ -208,9 +210,11 @@ class Comparison {
                             options_.tolerance));
     }
     if (report_.of_surface.found > most) {
-      Fault(absl::StrFormat("triangle %d of the surface is %g away from all facets at %s; at most %g is allowed",
-                            report_.of_surface.triangle, report_.of_surface.found, TextOf(report_.of_surface.at),
-                            options_.tolerance));
+      const std::string what = report_.of_surface.triangle == SurfaceComplex::kNoSource
+                                   ? "a side of the box"
+                                   : absl::StrCat("triangle ", report_.of_surface.triangle, " of the surface");
+      Fault(absl::StrFormat("%s is %g away from all facets at %s; at most %g is allowed", what,
+                            report_.of_surface.found, TextOf(report_.of_surface.at), options_.tolerance));
     }
   }
 
@@ -354,6 +358,19 @@ class Comparison {
     return 180 - angle >= kCreaseShare * surface_.features.crease_angle;
   }
 
+  // Holds the mesh to its box, and to the triangles before they are cut.
+  absl::Status TestBox() {
+    if (!surface_.features.box.has_value()) {
+      return absl::OkStatus();
+    }
+    const absl::Status boxed = ValidateBoxedMesh(mesh_, parts_, surface_, options_, context_);
+    if (boxed.code() != absl::StatusCode::kFailedPrecondition) {
+      return boxed;
+    }
+    Fault(std::string(boxed.message()));
+    return absl::OkStatus();
+  }
+
   absl::Status TestEdges() {
     WELLSPACE_ASSIGN_OR_RETURN(const FacetEdges edges, FacetEdges::Of(facets(), context_));
     std::vector<Triangle> ridges;
@@ -452,9 +469,19 @@ class Comparison {
     if (!surface_.features.keeps_points) {
       return absl::OkStatus();
     }
+    std::vector<bool> is_given(wanted_.complex.points.size());  // not where a side of a box cuts an edge
+    for (const uint32_t point : wanted_.complex.point_of_input) {
+      if (point != SurfaceComplex::kNoPoint) {
+        is_given[point] = true;
+      }
+    }
     std::vector<uint32_t> kept;
     for (const uint32_t t : wanted_.bounding) {
-      kept.insert(kept.end(), wanted_.complex.triangles[t].begin(), wanted_.complex.triangles[t].end());
+      for (const uint32_t point : wanted_.complex.triangles[t]) {
+        if (is_given[point]) {
+          kept.push_back(point);
+        }
+      }
     }
     return TestVertices(tree, kept, "the point");
   }

@@ -63,6 +63,7 @@ struct FidelityReport {
 //    triangles than two.
 // 6. Along all curves run edges where facets make an angle, have several tags, or are not two: the ridges, if they are
 //    known; and corners of curves are vertices, with `keeps_points` those of all triangles around meshed solids.
+// 7. With a box, what ValidateBoxedMesh says.
 //
 // Triangles of the surface are made clean, and their solids and curves are found by the code that a mesher prepares
 // them with, which is the reference. The mesh itself is measured without it: distances by a tree of boxes, insides

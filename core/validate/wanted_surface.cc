@@ -1,6 +1,7 @@
 #include "core/validate/wanted_surface.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numeric>
 #include <set>
@@ -8,10 +9,14 @@
 
 #include "core/base/cancellable_sort.h"
 #include "core/base/status_macros.h"
+#include "core/features/boxed_surface.h"
 #include "core/validate/membership.h"
 
 namespace wellspace::core {
 namespace {
+
+// A place where a side of a box is crossed is put onto another side that is as near, as a share of coordinates.
+constexpr double kRoundingOfCut = 0x1p-44;
 
 constexpr double kSmallPatch = 0.01;  // of the diagonal, where no length is given
 
@@ -85,6 +90,9 @@ class WantedFinder {
     if (out_.complex.triangles.empty()) {
       return absl::InvalidArgumentError("surface: no triangle has an area");
     }
+    if (surface_.features.box.has_value()) {
+      WELLSPACE_RETURN_IF_ERROR(Cut());
+    }
     WELLSPACE_ASSIGN_OR_RETURN(out_.solids, FindSolids(out_.complex, context_));
     std::vector<Triangle> all;
     for (uint32_t t = 0; t < out_.complex.triangles.size(); ++t) {
@@ -100,6 +108,24 @@ class WantedFinder {
   }
 
  private:
+  // Has the parts of triangles in the box and its sides be the complex.
+  absl::Status Cut() {
+    const Box<3>& box = *surface_.features.box;
+    double largest = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      largest = std::max({largest, std::abs(box.low[axis]), std::abs(box.high[axis])});
+    }
+    const double weld = surface_.features.weld;
+    WELLSPACE_ASSIGN_OR_RETURN(
+        BoxedSurface boxed, CutAtBox(out_.complex, box, weld, std::max(weld, kRoundingOfCut * largest), 0, context_));
+    if (boxed.do_meet || boxed.complex.triangles.empty()) {
+      return absl::InvalidArgumentError(boxed.do_meet ? "surface: triangles meet in a side of the box"
+                                                      : "surface: no triangle has a part with an area in the box");
+    }
+    out_.complex = std::move(boxed.complex);
+    return absl::OkStatus();
+  }
+
   absl::Status FindMeshed() {
     out_.is_meshed.assign(out_.solids.count, true);
     out_.is_meshed[0] = false;

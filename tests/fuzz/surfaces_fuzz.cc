@@ -59,9 +59,12 @@ void RequireSurface(const Surface& surface) {
 }
 
 // The findings about a complex have to fit together.
-void RequireReport(const core::SurfaceReport& report, uint64_t given) {
-  Require(report.triangles > 0 && report.triangles + report.flat_triangles + report.equal_triangles == given,
+void RequireReport(const core::SurfaceReport& report, const core::SurfaceFeatures& features) {
+  const uint64_t given = features.triangle_count();
+  const uint64_t dropped = report.flat_triangles + report.equal_triangles;
+  Require(report.triangles > 0 && (features.box.has_value() || report.triangles + dropped == given),
           "every triangle is there, or counted");
+  Require(report.cut_triangles + report.outside_triangles + dropped <= given, "a triangle is counted once");
   Require(report.patches > 0 && report.patches <= report.triangles, "every patch has a triangle");
   Require(2 * report.flipped_triangles <= report.triangles, "at most half are flipped");
   Require(report.volume.has_value() == report.faults.empty(), "a volume is told where nothing is wrong");
@@ -103,7 +106,8 @@ void RequireSameBackwards(const std::vector<double>& points, core::SurfaceFeatur
   Require(again.ok(), "the order of triangles is no error:", again.status().ToString());
   const auto figures = [](const core::SurfaceReport& r) {
     return std::tuple(r.triangles, r.area, r.volume, r.solids, r.curves, r.corners, r.patches, r.sharpest_angle_deg,
-                      r.sharpest_at, r.flipped_triangles, r.components, r.membranes, r.faults.size(), r.lost_area);
+                      r.sharpest_at, r.flipped_triangles, r.components, r.membranes, r.faults.size(), r.lost_area,
+                      r.cut_triangles, r.outside_triangles);
   };
   Require(figures(*again) == figures(report), "the order of triangles changes nothing");
 }
@@ -115,7 +119,7 @@ void Inspect(const std::vector<double>& points, const core::SurfaceFeatures& fea
             "what cannot be served is an INVALID_ARGUMENT:", report.status().ToString());
     return;
   }
-  RequireReport(*report, features.triangle_count());
+  RequireReport(*report, features);
   Require(features.solids != core::SolidRule::kWinding || report->faults.empty(), "a wrap has no faults");
   RequireSameBackwards(points, features, *report);
 }
@@ -153,6 +157,10 @@ void TryComplex(ByteReader& bytes, uint8_t kind) {
   if (kind == 'w') {
     features.solids = core::SolidRule::kWinding;
     features.resolution = 0.25 * (1 + bytes.Next() % 5);
+  } else if (kind == 'b') {
+    const double low = bytes.Next() % 2;
+    features.solids = core::SolidRule::kBox;
+    features.box = core::Box<3>{{low, 1, 1}, {3, 4 - low, 3}};
   } else {
     features.solids = bytes.Next() % 2 == 0 ? core::SolidRule::kEvenOdd : core::SolidRule::kHoles;
   }
@@ -186,7 +194,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace wellspace;
   fuzz::ByteReader bytes(data, size);
   const uint8_t choice = bytes.Next();
-  if (choice == 'x' || choice == 'w' || choice == 'k') {
+  if (choice == 'x' || choice == 'w' || choice == 'k' || choice == 'b') {
     fuzz::TryComplex(bytes, choice);
     return 0;
   }
