@@ -184,7 +184,7 @@ def _corners_of(box: Any) -> tuple[list[float], list[float]]:
     corners = coordinates(box, "surface_box", 3)
     if len(corners) != 2 or not (corners[0] < corners[1]).all():
         raise InvalidArgumentError(
-            f"surface_box is {corners.tolist()}; expected its low and its high corner, each low number below its high one",
+            f"surface_box is {corners.tolist()}; expected its low and its high corner, low numbers below high ones",
             field="surface_box",
         )
     return corners[0].tolist(), corners[1].tolist()
