@@ -34,6 +34,8 @@ const char* SolidRuleName(SolidRule rule) {
       return "holes";
     case SolidRule::kWinding:
       return "winding";
+    case SolidRule::kBox:
+      return "box";
     case SolidRule::kEvenOdd:
       break;
   }

@@ -2,6 +2,7 @@
 #ifndef WELLSPACE_CLIENT_TYPES_H_
 #define WELLSPACE_CLIENT_TYPES_H_
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -83,7 +84,7 @@ struct Features {
 };
 
 // The solids, into which triangles cut space, that are meshed; see the proto's SolidRule.
-enum class SolidRule { kEvenOdd, kHoles, kWinding };
+enum class SolidRule { kEvenOdd, kHoles, kWinding, kBox };
 
 // See the proto's SolidSeed.
 struct SolidSeed {
@@ -104,7 +105,8 @@ struct SurfaceFeatures {
   std::optional<double> crease_angle{};  // degrees
   std::optional<double> weld{};
   std::optional<double> min_patch{};
-  std::optional<double> resolution{};  // of kWinding
+  std::optional<double> resolution{};          // of kWinding
+  std::optional<std::array<double, 6>> box{};  // of kBox: the low corner, then the high one
   bool keeps_points = false;
   PartNames names;
 };
@@ -215,6 +217,8 @@ struct SurfaceStatistics {
   double deviation_of_facets = 0;
   double deviation_of_surface = 0;
   double lost_area = 0;
+  uint64_t cut_triangles = 0;
+  uint64_t outside_triangles = 0;
   std::vector<double> volumes;  // by region
 };
 

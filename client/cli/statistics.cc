@@ -33,6 +33,8 @@ std::string SurfaceText(const client::SurfaceStatistics& surface) {
   return CountsText(surface.triangles, "triangles",
                     {{surface.welded_points, "points welded"},
                      {surface.dropped_triangles, "triangles dropped"},
+                     {surface.cut_triangles, "triangles cut at sides of the box"},
+                     {surface.outside_triangles, "triangles outside of the box"},
                      {surface.unmeshed_points, "points outside"},
                      {surface.unused_seeds, "holes and regions outside"}});
 }

@@ -32,6 +32,12 @@ std::vector<core::SolidSeed> SeedsOf(const formats::Surface& surface) {
   return seeds;
 }
 
+std::vector<double> CornersOf(const core::Box<3>& box) {
+  std::vector<double> corners(box.low.begin(), box.low.end());
+  corners.insert(corners.end(), box.high.begin(), box.high.end());
+  return corners;
+}
+
 // Tags are told by the numbers of the surface's markers.
 core::SolidParts PartsOf(const formats::Mesh& mesh, const std::vector<int32_t>& tags) {
   core::SolidParts parts;
@@ -103,7 +109,7 @@ void SurfaceCheck::AddTo(CLI::App& command) {
   // A file of any content is a surface here.
   command.remove_option(command.get_option("--as-points"));
   command.remove_option(command.get_option("--triangles"));
-  for (const char* name : {"--solids", "--crease-angle", "--weld", "--resolution", "--keep-points"}) {
+  for (const char* name : {"--solids", "--box", "--crease-angle", "--weld", "--resolution", "--keep-points"}) {
     command.get_option(name)->needs("--surface");
   }
   AddLength(command, "--tolerance", tolerance_,
@@ -161,7 +167,7 @@ absl::Status SurfaceCheck::Compare(const core::MeshView& view, const core::Solid
   core::FidelityOptions wanted;
   wanted.tolerance =
       tolerance_.value_or(Length{.value = kDefaultTolerance, .is_share = true, .whole = Length::Whole::kDiagonal})
-          .Of(surface.points, 3);
+          .Of(features.box.has_value() ? CornersOf(*features.box) : surface.points, 3);
   WELLSPACE_ASSIGN_OR_RETURN(
       const core::FidelityReport report,
       core::CompareWithSurface(view, parts, {.points = surface.points, .features = features}, wanted, context));

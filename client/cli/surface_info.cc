@@ -86,6 +86,16 @@ void PrintChanges(const Json& json) {
     return absl::StrCat(count(absl::StrCat(kind, "_triangles").c_str()) > 1 ? ", such as at (" : ", at (",
                         Numbers(place["at"]), "): ", place["triangle"].get<std::string>());
   };
+  if (count("moved_points") > 0) {
+    PrintLine("moved", absl::StrFormat("%s onto sides of the box, within %.3g of it",
+                                       Counted(count("moved_points"), "point"), json["weld"].get<double>()));
+  }
+  if (count("cut_triangles") > 0) {
+    PrintLine("cut", absl::StrCat(Counted(count("cut_triangles"), "triangle"), " at the sides of the box"));
+  }
+  if (count("outside_triangles") > 0) {
+    PrintLine("dropped", absl::StrCat(Counted(count("outside_triangles"), "triangle"), " outside of the box"));
+  }
   if (count("flat_triangles") > 0) {
     PrintLine("dropped",
               absl::StrCat(Counted(count("flat_triangles"), "triangle"), " without an area", example("flat")));
@@ -172,6 +182,9 @@ Json SurfaceJson(const std::string& path, const formats::Surface& surface, const
   json["components"] = report.components;
   json["area"] = report.area;
   json["lost_area"] = report.lost_area;
+  json["moved_points"] = report.moved_points;
+  json["cut_triangles"] = report.cut_triangles;
+  json["outside_triangles"] = report.outside_triangles;
   json["volume"] = report.volume.has_value() ? Json(*report.volume) : Json(nullptr);
   json["solids"] = report.volume.has_value() ? Json(report.solids) : Json(nullptr);
   json["membranes"] = report.volume.has_value() ? Json(report.membranes) : Json(nullptr);

@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "client/cli/options.h"
 #include "client/cli/part_name_options.h"
 #include "client/cli/remote_command.h"
 #include "client/error_details.h"
@@ -20,6 +21,7 @@ namespace {
 constexpr char kEvenOdd[] = "even-odd";
 constexpr char kHoles[] = "holes";
 constexpr char kWinding[] = "winding";
+constexpr char kBox[] = "box";
 
 }  // namespace
 
@@ -37,9 +39,13 @@ void SurfaceOptions::AddTo(CLI::App& command, const std::string& what) {
           "Which solids, into which triangles cut space, are meant: even-odd, those that an odd number of "
           "triangles separates from outside; holes, all bounded ones but holes, so that materials may share "
           "facets; winding, the places that triangles go around, which need not bound anything: holes are closed, "
-          "overlaps united, and creases rounded off by --resolution; default: holes for .smesh, .poly and "
-          "several files, otherwise even-odd")
-      ->check(CLI::IsMember({kEvenOdd, kHoles, kWinding}));
+          "overlaps united, and creases rounded off by --resolution; box, all of --box, which sheets that reach its "
+          "sides or go beyond them cut; default: box with --box, holes for .smesh, .poly and several files, otherwise "
+          "even-odd")
+      ->check(CLI::IsMember({kEvenOdd, kHoles, kWinding, kBox}));
+  AddNumbers(command, "--box", box_,
+             "With --solids box: the box that is meshed, low corner then high corner. Triangles are cut at its sides, "
+             "and what is beyond is left out; the sides are parts of the boundary");
   AddLength(command, "--resolution", resolution_,
             "With --solids winding: side of the cells in which what is meshed is looked for: a length, or with % a "
             "share of the diagonal; default 0.5%",
@@ -111,6 +117,7 @@ absl::Status SurfaceOptions::CheckOther(const std::string& what) const {
                              : crease_angle_.has_value() ? "--crease-angle"
                              : weld_.has_value()         ? "--weld"
                              : resolution_.has_value()   ? "--resolution"
+                             : !box_.empty()             ? "--box"
                              : keeps_points_             ? "--keep-points"
                              : !seeds_path_.empty()      ? "--seeds"
                                                          : nullptr;
@@ -128,6 +135,17 @@ absl::StatusOr<formats::Surface> SurfaceOptions::Read(const std::string& path,
         absl::StrCat(option, ": ", path,
                      " is a surface, all of whose points are needed; leave it out, or give "
                      "--as-points"));
+  }
+  if (!box_.empty() && box_.size() != 6) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "--box: there are ", box_.size(), " numbers; expected 6, the low corner and then the high one: x,y,z,x,y,z"));
+  }
+  if (box_.empty() && solids_ == kBox) {
+    return absl::InvalidArgumentError("--solids box: needs --box, its low corner and then its high one");
+  }
+  if (!box_.empty() && !solids_.empty() && solids_ != kBox) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("--box: not with --solids ", solids_, "; leave it out, or give --solids box"));
   }
   std::vector<formats::Surface> surfaces;
   uint64_t points = 0;
@@ -150,9 +168,14 @@ core::SurfaceFeatures SurfaceOptions::FeaturesOf(const formats::Surface& surface
   features.corners = surface.corners;
   features.markers = surface.markers;
   const bool holes = solids_.empty() ? surface.solids == formats::Surface::SolidRule::kHoles : solids_ == kHoles;
-  features.solids = solids_ == kWinding ? core::SolidRule::kWinding
-                    : holes             ? core::SolidRule::kHoles
-                                        : core::SolidRule::kEvenOdd;
+  const bool box = solids_.empty() ? !box_.empty() : solids_ == kBox;
+  features.solids = box                   ? core::SolidRule::kBox
+                    : solids_ == kWinding ? core::SolidRule::kWinding
+                    : holes               ? core::SolidRule::kHoles
+                                          : core::SolidRule::kEvenOdd;
+  if (!box_.empty()) {
+    features.box = core::Box<3>{{box_[0], box_[1], box_[2]}, {box_[3], box_[4], box_[5]}};
+  }
   features.resolution = resolution_.has_value() ? resolution_->Of(surface.points, 3) : 0;
   features.crease_angle = crease_angle_.value_or(features.crease_angle);
   features.weld = weld_.has_value() ? weld_->Of(surface.points, 3) : client::DefaultWeld(surface);
@@ -170,9 +193,14 @@ absl::StatusOr<formats::PointCloud> SurfaceOptions::ReadInput(const std::string&
   surface_ = std::move(surface);
   const core::SurfaceFeatures rules = FeaturesOf(*surface_);
   client::SurfaceFeatures features = client::FeaturesOf(*surface_, seeds_.seeds, surface_->notes);
-  features.solids = rules.solids == core::SolidRule::kHoles     ? client::SolidRule::kHoles
+  features.solids = rules.solids == core::SolidRule::kBox       ? client::SolidRule::kBox
+                    : rules.solids == core::SolidRule::kHoles   ? client::SolidRule::kHoles
                     : rules.solids == core::SolidRule::kWinding ? client::SolidRule::kWinding
                                                                 : client::SolidRule::kEvenOdd;
+  if (rules.box.has_value()) {
+    const auto& [low, high] = *rules.box;
+    features.box = {low[0], low[1], low[2], high[0], high[1], high[2]};
+  }
   if (rules.resolution > 0) {
     features.resolution = rules.resolution;
   }

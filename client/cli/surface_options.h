@@ -24,8 +24,8 @@
 
 namespace wellspace::cli {
 
-// A surface in space, in one file or several: --triangles, --as-points, --solids, --crease-angle and --weld;
-// where it is meshed --seeds.
+// A surface in space, in one file or several: --triangles, --as-points, --solids, --box, --crease-angle and
+// --weld; where it is meshed --seeds.
 //
 // Thread safety: thread-compatible.
 class SurfaceOptions {
@@ -102,6 +102,7 @@ class SurfaceOptions {
   std::optional<double> crease_angle_;
   std::optional<Length> weld_;
   std::optional<Length> resolution_;
+  std::vector<double> box_;
   bool keeps_points_ = false;
   client::PartNames names_;
   std::string seeds_path_;

@@ -59,7 +59,8 @@ PartNames NamesFromProto(const v1::PartNames& message) {
 SurfaceFeatures SurfaceFromProto(const v1::SurfaceOptions& message) {
   const auto get = [](bool is_given, double value) { return is_given ? std::optional(value) : std::nullopt; };
   SurfaceFeatures surface;
-  surface.solids = message.solids() == v1::SOLID_RULE_HOLES     ? SolidRule::kHoles
+  surface.solids = message.solids() == v1::SOLID_RULE_BOX       ? SolidRule::kBox
+                   : message.solids() == v1::SOLID_RULE_HOLES   ? SolidRule::kHoles
                    : message.solids() == v1::SOLID_RULE_WINDING ? SolidRule::kWinding
                                                                 : SolidRule::kEvenOdd;
   surface.crease_angle = get(message.has_crease_angle(), message.crease_angle());
@@ -67,6 +68,11 @@ SurfaceFeatures SurfaceFromProto(const v1::SurfaceOptions& message) {
   surface.min_patch = get(message.has_min_patch(), message.min_patch());
   surface.resolution = get(message.has_resolution(), message.resolution());
   surface.keeps_points = message.keep_points();
+  if (message.box().low_size() == 3 && message.box().high_size() == 3) {
+    surface.box.emplace();
+    std::copy(message.box().low().begin(), message.box().low().end(), surface.box->begin());
+    std::copy(message.box().high().begin(), message.box().high().end(), surface.box->begin() + 3);
+  }
   return surface;
 }
 
@@ -159,6 +165,8 @@ SurfaceStatistics SurfaceFromProto(const v1::SurfaceStatistics& surface) {
           .deviation_of_facets = surface.deviation_of_facets(),
           .deviation_of_surface = surface.deviation_of_surface(),
           .lost_area = surface.lost_area(),
+          .cut_triangles = surface.cut_triangles(),
+          .outside_triangles = surface.outside_triangles(),
           .volumes = VectorOf(surface.volumes())};
 }
 

@@ -118,7 +118,8 @@ size_t FillSurface(const SurfaceFeatures& surface, size_t first, v1::SurfaceOpti
   };
   const size_t end = std::min(first + kSeedsOfARequest, surface.seeds.size());
   options.Clear();
-  options.set_solids(surface.solids == SolidRule::kHoles     ? v1::SOLID_RULE_HOLES
+  options.set_solids(surface.solids == SolidRule::kBox       ? v1::SOLID_RULE_BOX
+                     : surface.solids == SolidRule::kHoles   ? v1::SOLID_RULE_HOLES
                      : surface.solids == SolidRule::kWinding ? v1::SOLID_RULE_WINDING
                                                              : v1::SOLID_RULE_EVEN_ODD);
   set(surface.crease_angle, &v1::SurfaceOptions::set_crease_angle);
@@ -126,6 +127,10 @@ size_t FillSurface(const SurfaceFeatures& surface, size_t first, v1::SurfaceOpti
   set(surface.min_patch, &v1::SurfaceOptions::set_min_patch);
   set(surface.resolution, &v1::SurfaceOptions::set_resolution);
   options.set_keep_points(surface.keeps_points);
+  if (surface.box.has_value()) {
+    options.mutable_box()->mutable_low()->Add(surface.box->begin(), surface.box->begin() + 3);
+    options.mutable_box()->mutable_high()->Add(surface.box->begin() + 3, surface.box->end());
+  }
   if (first == 0 && !surface.names.IsEmpty()) {
     FillNames(surface.names, *options.mutable_names());
   }

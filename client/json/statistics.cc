@@ -55,6 +55,8 @@ Json SurfaceJson(const SurfaceStatistics& surface) {
           {"deviation_of_facets", surface.deviation_of_facets},
           {"deviation_of_surface", surface.deviation_of_surface},
           {"lost_area", surface.lost_area},
+          {"cut_triangles", surface.cut_triangles},
+          {"outside_triangles", surface.outside_triangles},
           {"volumes", surface.volumes}};
 }
 

@@ -1,5 +1,6 @@
 #include "server/inputs/space_features.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -22,12 +23,14 @@ absl::Status Refusal(const std::string& message, const char* field) {
 }
 
 bool IsKnown(v1::SolidRule rule) {
-  return rule == v1::SOLID_RULE_UNSPECIFIED || rule == v1::SOLID_RULE_HOLES || rule == v1::SOLID_RULE_EVEN_ODD ||
-         rule == v1::SOLID_RULE_WINDING;
+  return rule == v1::SOLID_RULE_UNSPECIFIED || rule == v1::SOLID_RULE_BOX || rule == v1::SOLID_RULE_HOLES ||
+         rule == v1::SOLID_RULE_EVEN_ODD || rule == v1::SOLID_RULE_WINDING;
 }
 
 core::SolidRule RuleFromProto(v1::SolidRule rule) {
   switch (rule) {
+    case v1::SOLID_RULE_BOX:
+      return core::SolidRule::kBox;
     case v1::SOLID_RULE_HOLES:
       return core::SolidRule::kHoles;
     case v1::SOLID_RULE_WINDING:
@@ -39,6 +42,8 @@ core::SolidRule RuleFromProto(v1::SolidRule rule) {
 
 v1::SolidRule RuleToProto(core::SolidRule rule) {
   switch (rule) {
+    case core::SolidRule::kBox:
+      return v1::SOLID_RULE_BOX;
     case core::SolidRule::kHoles:
       return v1::SOLID_RULE_HOLES;
     case core::SolidRule::kWinding:
@@ -70,6 +75,11 @@ core::SurfaceFeatures RulesFromProto(const v1::SurfaceOptions& options) {
   rules.min_patch = options.min_patch();
   rules.resolution = options.resolution();
   rules.keeps_points = options.keep_points();
+  if (options.box().low_size() == 3 && options.box().high_size() == 3) {
+    rules.box.emplace();
+    std::copy(options.box().low().begin(), options.box().low().end(), rules.box->low.begin());
+    std::copy(options.box().high().begin(), options.box().high().end(), rules.box->high.begin());
+  }
   return rules;
 }
 
@@ -87,6 +97,10 @@ v1::SurfaceOptions RulesToProto(const core::SurfaceFeatures& rules) {
     options.set_resolution(rules.resolution);
   }
   options.set_keep_points(rules.keeps_points);
+  if (rules.box.has_value()) {
+    options.mutable_box()->mutable_low()->Add(rules.box->low.begin(), rules.box->low.end());
+    options.mutable_box()->mutable_high()->Add(rules.box->high.begin(), rules.box->high.end());
+  }
   return options;
 }
 
@@ -104,6 +118,24 @@ absl::Status CheckSeed(const v1::SolidSeed& seed, uint64_t number) {
   return absl::OkStatus();
 }
 
+absl::Status CheckBox(const v1::SurfaceOptions& options) {
+  if (options.has_box() != (options.solids() == v1::SOLID_RULE_BOX)) {
+    return Refusal(options.has_box() ? "box: it is of SOLID_RULE_BOX alone; leave it out, or take this"
+                                     : "box: SOLID_RULE_BOX needs one; expected three low and three high coordinates",
+                   "surface.box");
+  }
+  const v1::Box& box = options.box();
+  bool is_box = box.low_size() == 3 && box.high_size() == 3;
+  for (int axis = 0; axis < 3 && is_box; ++axis) {
+    is_box = std::isfinite(box.low(axis)) && std::isfinite(box.high(axis)) && box.low(axis) < box.high(axis);
+  }
+  return !options.has_box() || is_box
+             ? absl::OkStatus()
+             : Refusal(absl::StrCat("box: low has ", box.low_size(), " numbers and high ", box.high_size(),
+                                    "; expected three finite ones each, every low one below its high one"),
+                       "surface.box");
+}
+
 }  // namespace
 
 absl::Status NotInSpace(const char* field, int dimension) {
@@ -118,9 +150,10 @@ absl::Status CheckTriangles(const v1::TriangleChunk& chunk, uint64_t first) {
 
 absl::Status CheckSurface(const v1::SurfaceOptions& options, uint64_t first) {
   if (!IsKnown(options.solids())) {
-    return Refusal(absl::StrCat("solids: ", static_cast<int>(options.solids()),
-                                " is not known; 2 (holes), 3 (even-odd) and 4 (winding) are, and 0 for the default"),
-                   "surface.solids");
+    return Refusal(
+        absl::StrCat("solids: ", static_cast<int>(options.solids()),
+                     " is not known; 1 (box), 2 (holes), 3 (even-odd) and 4 (winding) are, and 0 for the default"),
+        "surface.solids");
   }
   const double angle = options.crease_angle();
   if (options.has_crease_angle() && !(angle >= 0 && angle <= kMostCreaseAngle)) {
@@ -139,6 +172,7 @@ absl::Status CheckSurface(const v1::SurfaceOptions& options, uint64_t first) {
                      field);
     }
   }
+  WELLSPACE_RETURN_IF_ERROR(CheckBox(options));
   for (int i = 0; i < options.seeds_size(); ++i) {
     WELLSPACE_RETURN_IF_ERROR(CheckSeed(options.seeds(i), first + i));
   }
@@ -191,7 +225,7 @@ bool SpaceFeatures::HasOtherRules(const v1::SurfaceOptions& options) const {
   const core::SurfaceFeatures rules = RulesFromProto(options);
   return IsEmpty() || rules.solids != rules_.solids || rules.crease_angle != rules_.crease_angle ||
          rules.weld != rules_.weld || rules.min_patch != rules_.min_patch || rules.resolution != rules_.resolution ||
-         rules.keeps_points != rules_.keeps_points ||
+         rules.keeps_points != rules_.keeps_points || rules.box != rules_.box ||
          (options.has_names() && NamesFromProto(options.names()) != names_);
 }
 

@@ -142,6 +142,8 @@ void SetSurface(const core::SurfaceStatistics& surface, v1::SurfaceStatistics& m
   message.set_deviation_of_facets(surface.deviation_of_facets);
   message.set_deviation_of_surface(surface.deviation_of_surface);
   message.set_lost_area(surface.lost_area);
+  message.set_cut_triangles(surface.cut_triangles);
+  message.set_outside_triangles(surface.outside_triangles);
   message.mutable_volumes()->Assign(surface.volumes.begin(), surface.volumes.end());
 }
 

@@ -134,6 +134,7 @@ absl::Status FromCore(const absl::Status& status) {
                                         {"weld:", "surface.weld"},
                                         {"min_patch:", "surface.min_patch"},
                                         {"resolution:", "surface.resolution"},
+                                        {"box:", "surface.box"},
                                         {"keep_points:", "surface.keep_points"}}) {
         if (message.rfind(what, 0) == 0) {
           return MakeError(v1::ERROR_REASON_INVALID_TRIANGLES, message, field);

@@ -96,7 +96,13 @@ class FakeSurface {
     }
     if (request.has_surface()) {
       const v1::SurfaceOptions& options = request.surface();
-      surface_.solids = options.solids() == v1::SOLID_RULE_HOLES ? SolidRule::kHoles : SolidRule::kEvenOdd;
+      surface_.solids = options.solids() == v1::SOLID_RULE_HOLES ? SolidRule::kHoles
+                        : options.solids() == v1::SOLID_RULE_BOX ? SolidRule::kBox
+                                                                 : SolidRule::kEvenOdd;
+      if (options.has_box()) {
+        surface_.box = {options.box().low(0),  options.box().low(1),  options.box().low(2),
+                        options.box().high(0), options.box().high(1), options.box().high(2)};
+      }
       surface_.crease_angle = options.has_crease_angle() ? std::optional(options.crease_angle()) : std::nullopt;
       surface_.weld = options.has_weld() ? std::optional(options.weld()) : std::nullopt;
       surface_.min_patch = options.has_min_patch() ? std::optional(options.min_patch()) : std::nullopt;
@@ -168,6 +174,12 @@ TEST(AddTriangles, OptionsComeWithoutTriangles) {
   EXPECT_EQ(held.surface().min_patch, 0.5);
   EXPECT_EQ(held.surface().crease_angle, std::nullopt);
   EXPECT_EQ(held.surface().markers.size(), 1u);
+  EXPECT_EQ(held.surface().box, std::nullopt);
+  rules.solids = SolidRule::kBox;
+  rules.box = {0, 1, 2, 3, 4, 5};
+  ASSERT_TRUE(server.Client().AddTriangles(kSession, rules).ok());
+  EXPECT_EQ(held.surface().solids, SolidRule::kBox);
+  EXPECT_EQ(held.surface().box, rules.box);
 }
 
 TEST(AddTriangles, ErrorsOfTheServer) {

@@ -81,6 +81,21 @@ class SurfaceTest(Case):
             with self.fails(InvalidArgumentError, message):
                 wellspace.mesh(points, triangles=triangles, **given)
 
+    def test_a_sheet_parts_a_box(self):
+        sheet = np.array([[-1, -1, 0.25], [2, -1, 0.25], [2, 2, 0.25], [-1, 2, 0.25]])
+        triangles = [[0, 1, 2], [0, 2, 3]]
+        box = [[0, 0, 0], [1, 1, 1]]
+        mesh = wellspace.mesh(sheet, triangles=triangles, markers=[9, 9], surface_box=box, min_dihedral=0)
+        self.assertAlmostEqual(volume(mesh) / 6, 1, places=12)
+        self.assertEqual(set(mesh.facet_names.values()),
+                         {"xmin", "xmax", "ymin", "ymax", "zmin", "zmax", "marker_9"})
+        self.assertEqual(len(mesh.region_names), 2)
+        for given, field in (({"surface_box": [[0, 0, 0], [1, 1, 0]]}, "surface_box"),
+                             ({"surface_box": box, "solids": "holes"}, "surface.box"),
+                             ({"solids": "box"}, "surface.box")):
+            with self.fails(InvalidArgumentError, "box", field=field):
+                wellspace.mesh(sheet, triangles=triangles, **given)
+
     def test_names(self):
         mesh = wellspace.mesh(CORNERS, triangles=CUBE, markers=["low"] * 2 + ["side"] * 10,
                               regions=[(0.5, 0.5, 0.5, "steel")])
@@ -101,7 +116,7 @@ class SurfaceTest(Case):
             ({"triangles": CUBE, "markers": [1]}, "12", "markers"),
             ({"triangles": CUBE, "crease_angle": 181}, "from 0 to 180", "crease_angle"),
             ({"triangles": CUBE, "weld": -1}, "at least 0", "weld"),
-            ({"triangles": CUBE, "solids": "box"}, "'holes', 'even-odd'", "solids"),
+            ({"triangles": CUBE, "solids": "crate"}, "'holes', 'even-odd'", "solids"),
             ({"triangles": CUBE, "regions": [(1, 2)]}, "(x, y, z, region, max_volume)", "regions[0]"),
             ({"triangles": CUBE, "segments": [[0, 1]]}, "2-D only", "segments"),
             ({"markers": [1]}, "segments or triangles", "markers"),

@@ -2,6 +2,7 @@
 #include "server/inputs/space_features.h"
 
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "gmock/gmock.h"
@@ -32,6 +33,27 @@ v1::SurfaceOptions Surface(v1::SolidRule rule, const std::vector<double>& seeds 
     seed.set_z(seeds[i + 2]);
   }
   return options;
+}
+
+v1::Box BoxOf(const std::vector<double>& low, const std::vector<double>& high) {
+  v1::Box box;
+  box.mutable_low()->Add(low.begin(), low.end());
+  box.mutable_high()->Add(high.begin(), high.end());
+  return box;
+}
+
+TEST(SpaceFeatures, KeepsTheBox) {
+  SpaceFeatures store;
+  v1::SurfaceOptions options = Surface(v1::SOLID_RULE_BOX);
+  *options.mutable_box() = BoxOf({0, 1, 2}, {3, 4, 5});
+  EXPECT_TRUE(CheckSurface(options, 0).ok());
+  store.Append(options);
+  EXPECT_EQ(store.View().solids, core::SolidRule::kBox);
+  EXPECT_EQ(store.View().box, (core::Box<3>{{0, 1, 2}, {3, 4, 5}}));
+  EXPECT_EQ(store.Summary().surface->box().high(2), 5);
+  EXPECT_FALSE(store.HasOtherRules(options));
+  options.mutable_box()->set_high(2, 6);
+  EXPECT_TRUE(store.HasOtherRules(options));
 }
 
 TEST(SpaceFeatures, KeepsMarkersOfTrianglesFromManyChunks) {
@@ -146,7 +168,17 @@ TEST(CheckSurface, RefusesWhatCannotBe) {
     EXPECT_EQ(DetailsOf(status).reason, "INVALID_TRIANGLES");
     return DetailsOf(status).field;
   };
-  EXPECT_EQ(field([](auto& o) { o.set_solids(static_cast<v1::SolidRule>(1)); }), "surface.solids");
+  EXPECT_EQ(field([](auto& o) { o.set_solids(static_cast<v1::SolidRule>(5)); }), "surface.solids");
+  EXPECT_EQ(field([](auto& o) { o.set_solids(v1::SOLID_RULE_BOX); }), "surface.box") << "needs one";
+  EXPECT_EQ(field([](auto& o) { *o.mutable_box() = BoxOf({0, 0, 0}, {1, 1, 1}); }), "surface.box") << "of another rule";
+  for (const auto& [low, high] : std::vector<std::pair<std::vector<double>, std::vector<double>>>{
+           {{0, 0}, {1, 1}}, {{0, 0, 0}, {1, 0, 1}}, {{0, 0, kNan}, {1, 1, 1}}, {{0, 0, 0}, {1, 1, kInfinity}}, {}}) {
+    EXPECT_EQ(field([&](auto& o) {
+                o.set_solids(v1::SOLID_RULE_BOX);
+                *o.mutable_box() = BoxOf(low, high);
+              }),
+              "surface.box");
+  }
   for (const double angle : {kNan, -1.0, 180.5, kInfinity}) {
     EXPECT_EQ(field([&](auto& o) { o.set_crease_angle(angle); }), "surface.crease_angle") << angle;
   }

@@ -61,6 +61,7 @@ class Surface:
     solids: int
     numbers: dict[str, float]  # crease_angle, weld and such, as far as they are given
     keep_points: bool
+    box: tuple[list[float], list[float]] | None  # low and high corner; of solids by box alone
     names: Any  # a PartNames; None: there are none
 
     request_fields = (7, 8)
@@ -93,6 +94,9 @@ class Surface:
             options = _api.message("SurfaceOptions")(
                 solids=self.solids, keep_points=self.keep_points, **self.numbers
             )
+            if self.box is not None:
+                options.box.low.extend(self.box[0])
+                options.box.high.extend(self.box[1])
             if first == 0 and self.names is not None:
                 options.names.CopyFrom(self.names)
             options.seeds.extend(seeds[first : first + SEEDS_OF_A_REQUEST])
@@ -105,11 +109,15 @@ class TriangleArguments(TypedDict, total=False):
         In 3-D: numbers of points. Their solids are meshed, and the mesh meets them within `tolerance`; their corners
         are no vertices, unless `keep_points` says so. The orientation of a triangle means nothing, but with
         ``solids="winding"``. See `wellspace.read_surface`. Default: none.
-    solids : {"even-odd", "holes", "winding"}
+    solids : {"even-odd", "holes", "winding", "box"}
         Which solids, into which triangles cut space, are meshed: those that an odd number of triangles separates from
         infinity; all bounded ones, as of several materials; or the places that triangles go around, which need not
-        bound anything: holes are closed, overlaps united, and creases rounded off by `resolution`. Solids with a hole
-        never are. Default "even-odd".
+        bound anything: holes are closed, overlaps united, and creases rounded off by `resolution`; or all of
+        `surface_box`, which sheets that reach its sides or go beyond them cut. Solids with a hole never are. Default
+        "box" with a `surface_box`, else "even-odd".
+    surface_box : (2, 3) float
+        With ``solids="box"``: the low and the high corner of what is meshed. Triangles are cut at its sides, which are
+        parts of the boundary by the names ``"xmin"``, ``"xmax"`` and so on. In the unit of the points.
     crease_angle : float
         Edges whose triangles have normals farther apart than this are creases, which the mesh keeps. Degrees, from 0 to
         180, which is none. Default 30.
@@ -132,6 +140,7 @@ class TriangleArguments(TypedDict, total=False):
     weld: Number
     min_patch: Number
     resolution: Number
+    surface_box: Any
     keep_points: bool
 
 
@@ -162,11 +171,23 @@ def make_surface(
         markers=marker_names.numbers_of(given["markers"], "markers", len(corners)) if "markers" in given else None,
         holes=coordinates(given.get("holes", []), "holes", 3),
         regions=tuple(_seed(one, f"regions[{row}]", region_names) for row, one in enumerate(regions)),
-        solids=choice(given.get("solids", "even-odd"), "solids", _SOLIDS),
+        solids=choice(given.get("solids", "box" if "surface_box" in given else "even-odd"), "solids", _SOLIDS),
         numbers=numbers,
         keep_points=bool(given.get("keep_points", False)),
+        box=_corners_of(given["surface_box"]) if "surface_box" in given else None,
         names=names_message(marker_names, region_names),
     )
+
+
+def _corners_of(box: Any) -> tuple[list[float], list[float]]:
+    """The low and the high corner of a box."""
+    corners = coordinates(box, "surface_box", 3)
+    if len(corners) != 2 or not (corners[0] < corners[1]).all():
+        raise InvalidArgumentError(
+            f"surface_box is {corners.tolist()}; expected its low and its high corner, low numbers below high ones",
+            field="surface_box",
+        )
+    return corners[0].tolist(), corners[1].tolist()
 
 
 def _seed(value: Any, name: str, names: NameTable) -> SolidSeed:

@@ -117,6 +117,8 @@ class SurfaceStatistics:
     deviation_of_facets: float
     deviation_of_surface: float
     lost_area: float
+    cut_triangles: int
+    outside_triangles: int
     volumes: tuple[float, ...]
 
 
