@@ -40,12 +40,16 @@ std::string NetworkLab::WhyNot() {
   if (Shell("command -v ip nsenter setpriv", said) != 0) {
     return "there is no iproute2 (deploy/install-deps.sh test)";
   }
-  // A container's root may have no CAP_NET_ADMIN, and a kernel no rules.
-  const int code = Shell(absl::StrCat("ip netns add ", probe, "; trap 'ip netns del ", probe, "' EXIT; ip -n ", probe,
-                                      " link add name probe0 type veth peer name probe1; ip -n ", probe,
-                                      " rule add from 10.0.0.1 to 10.0.0.2 blackhole"),
-                         said);
-  return code == 0 ? "" : "this process may make no network namespaces: it has no CAP_NET_ADMIN, or the kernel none";
+  // A container's root may have no CAP_NET_ADMIN, or no /proc/sys to write to, and a kernel no rules.
+  const int code =
+      Shell(absl::StrCat("ip netns add ", probe, "; trap 'ip netns del ", probe, "' EXIT; nsenter --net=", kNamespaces,
+                         "/", probe, " sh -c 'echo 1 > /proc/sys/net/ipv4/ip_forward'; ", "ip link add name ws",
+                         getpid(), "p type veth peer name probe netns ", probe, "; ip -n ", probe,
+                         " rule add from 10.0.0.1 to 10.0.0.2 blackhole"),
+            said);
+  return code == 0 ? ""
+                   : "this process may make no network namespaces: it has no CAP_NET_ADMIN, or may not "
+                     "have them forward, or the kernel has none";
 }
 
 NetworkLab::NetworkLab() {
