@@ -83,6 +83,9 @@ void PrintChanges(const client::Json& json) {
   // "at (0, 0, 1): part.off:17", and if there are more "such as at …".
   const auto example = [&](const char* kind) {
     const client::Json& place = json[absl::StrCat(kind, "_example")];
+    if (place.is_null()) {
+      return std::string();
+    }
     return absl::StrCat(count(absl::StrCat(kind, "_triangles").c_str()) > 1 ? ", such as at (" : ", at (",
                         Numbers(place["at"]), "): ", place["triangle"].get<std::string>());
   };

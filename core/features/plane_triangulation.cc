@@ -18,6 +18,8 @@ namespace wellspace::core {
 namespace {
 
 constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
+// Looks at a side on the way to Delaunay, on average: inputs that take more are far from any that is met.
+constexpr size_t kMostLooks = 64;
 
 class Sweep {
  public:
@@ -261,7 +263,8 @@ class Flips {
     std::vector<uint32_t> pending(beyond_.size());
     std::iota(pending.begin(), pending.end(), 0);
     std::vector<bool> is_pending(pending.size(), true);
-    for (size_t step = 0; !pending.empty(); ++step) {
+    const size_t most = kMostLooks * pending.size();
+    for (size_t step = 0; !pending.empty() && step < most; ++step) {
       WELLSPACE_RETURN_IF_ERROR(CheckAt(8 * step, context_));
       const uint32_t side = pending.back();
       pending.pop_back();

@@ -25,10 +25,9 @@ struct PlaneTriangulation {
 //
 // REQUIRES:   points are distinct, and ascend; the ends of a segment are two points, and no two segments have the same.
 // Guarantees: (1) each triangle has an area, and no two overlap; together they cover the hull; (2) no corner
-//             of a triangle is in the circumcircle of a neighbour, unless a segment parts them; (3) the order of
-//             segments changes nothing.
-// Complexity: O((n + m) log (n + m)), and the flips that make it Delaunay: few for each point of most inputs, O(n^2) of
-//             the worst. Signs are exact.
+//             of a triangle is in the circumcircle of a neighbour, unless a segment parts them, or that takes more than
+//             64 looks a side, as on some convex curves of 10^5 points; (3) the order of segments changes nothing.
+// Complexity: O((n + m) log (n + m)). Signs are exact.
 // Errors:     CANCELLED, DEADLINE_EXCEEDED.
 // Source:     Hertel, Mehlhorn: Fast triangulation of the plane with respect to simple polygons, 1985: a sweep that
 //             keeps, between two segments that it crosses, the border of what it has triangulated there. Shamos, Hoey:

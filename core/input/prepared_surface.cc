@@ -276,6 +276,7 @@ class Preparer {
     if (shape.flipped_triangles > 0) {
       report_.flipped_at = {.at = frame_.Unscaled(complex_.Corner(shape.first_flipped, 0)),
                             .triangles = {complex_.sources[shape.first_flipped]}};
+      std::erase(report_.flipped_at.triangles, SurfaceComplex::kNoSource);  // it may be of a side of the box
     }
     report_.one_sided = shape.one_sided;
     if (shape.open_edges < complex_.edges.size()) {
@@ -483,13 +484,11 @@ absl::Status CheckSurfaceFeatures(std::span<const double> points, const SurfaceF
                                           ? "box: it is of solids by box alone; leave it out, or take these"
                                           : "box: solids by box need one; expected its low corner and its high one");
   }
-  if (features.box.has_value()) {
-    for (size_t i = 0; i < features.markers.size(); ++i) {
-      if (IsSideMarker(features.markers[i])) {
-        return absl::InvalidArgumentError(absl::StrCat("markers[", i, "]: ", features.markers[i],
-                                                       " is that of a side of the box; expected at least ",
-                                                       int64_t{kFirstSideMarker} + 6));
-      }
+  for (size_t i = 0; i < features.markers.size(); ++i) {
+    if (IsSideMarker(features.markers[i])) {
+      return absl::InvalidArgumentError(absl::StrCat("markers[", i, "]: ", features.markers[i],
+                                                     " is that of a side of a box; expected at least ",
+                                                     int64_t{kFirstSideMarker} + 6));
     }
   }
   if (features.keeps_points && features.solids == SolidRule::kWinding) {

@@ -131,7 +131,8 @@ absl::StatusOr<HugeVector<double>> VertexNumbering<D>::PointsFrom(const QueryStr
     std::copy(p.begin(), p.end(), &out[place_of(i)]);
   }
   for (const size_t at : negative_zeros_) {
-    if (at >= first * D) {
+    // A point that was led onto a side of the box, or merged, is elsewhere.
+    if (at >= first * D && out[at - first * D] == 0) {
       out[at - first * D] = -0.0;
     }
   }

@@ -54,12 +54,17 @@ absl::StatusOr<std::optional<SimplexChanges>> BoxMesher<D>::FindChangedSimplices
   if (pumps_ || !mesh.weights.empty() || followed_ == Followed::kNot) {
     return std::nullopt;
   }
+  // After an error, of memory that is not there, the rows are followed no more.
+  const Followed followed = std::exchange(followed_, Followed::kNot);
   if constexpr (D == 3) {
     if (MakesByStage()) {
-      if (followed_ != Followed::kByStage) {
+      if (followed != Followed::kByStage) {
         return std::nullopt;
       }
-      return slivers_.Update(numbering_.output_index(), context);
+      WELLSPACE_ASSIGN_OR_RETURN(std::optional<SimplexChanges> changes,
+                                 slivers_.Update(numbering_.output_index(), context));
+      followed_ = Followed::kByStage;
+      return changes;
     }
   }
   if (repairs_.has_moved()) {

@@ -290,7 +290,8 @@ void MesherOf<Domain>::Finish(Mesh& mesh) {
 template <typename Domain>
 absl::StatusOr<MeshEstimate> MesherOf<Domain>::EstimateOfTree(const MeshCriteria<D>& criteria, bool is_to_reserve,
                                                               const RunContext& context) const {
-  if (!is_to_reserve || !IsPredictable()) {
+  // Few leaves of another domain may all be outside of it.
+  if (!is_to_reserve || Domain::kHasFeatures) {
     return EstimateMeshOf<D>(structure_, criteria, context, {}, planar());
   }
   if (const std::optional<SizeEstimate> typical = TypicalSize<D>(structure_, criteria);

@@ -250,20 +250,28 @@ absl::Status PlaneMesher::Split(std::span<const Subsegment> subsegments, const M
     }
     const SegmentPoint place = planar_->MiddleOf(segment, from, to);
     const SegmentPoint image = planar_->ImageOf(place);
-    WELLSPACE_RETURN_IF_ERROR(AddOnSegment(place, from, parameters));
+    WELLSPACE_ASSIGN_OR_RETURN(const NewOnSegment added, CheckOnSegment(place, from, 0, parameters));
+    std::optional<NewOnSegment> added_image;  // with its image, or not at all
     if (image.IsOnSegment()) {
-      WELLSPACE_RETURN_IF_ERROR(AddOnSegment(image, kNoVertex, parameters));
+      WELLSPACE_ASSIGN_OR_RETURN(added_image, CheckOnSegment(image, kNoVertex, 1, parameters));
+    }
+    AddOnSegment(added);
+    if (added_image.has_value()) {
+      AddOnSegment(*added_image);
       split_by_image[image.segment].push_back(planar_->DistanceFromEnd(image, false));
     }
   }
   return absl::OkStatus();
 }
 
-// Adds a vertex on a segment, near the vertex `near` if that is one.
-absl::Status PlaneMesher::AddOnSegment(const SegmentPoint& place, VertexId near, const MeshParameters& parameters) {
+// Refuses a vertex on a segment that may not be there; near the vertex `near` if that is one, and after `before` others
+// that are to be added.
+absl::StatusOr<PlaneMesher::NewOnSegment> PlaneMesher::CheckOnSegment(const SegmentPoint& place, VertexId near,
+                                                                      uint64_t before,
+                                                                      const MeshParameters& parameters) {
   const Point<2> position = planar_->PositionOf(place);
   const Neighbor nearest = structure_.NearestTo(position, near, workspace_);
-  if (structure_.vertex_count() >= VertexBudget(parameters)) {
+  if (structure_.vertex_count() + before >= VertexBudget(parameters)) {
     return TooManyVerticesError(VertexBudget(parameters));
   }
   if (nearest.distance_sq < frame_.MinEdge() * frame_.MinEdge()) {
@@ -273,10 +281,13 @@ absl::Status PlaneMesher::AddOnSegment(const SegmentPoint& place, VertexId near,
                      2 * std::sqrt(nearest.distance_sq) / frame_.scale,
                      " long, and another vertex is still too near to it; raise the angles or distances there"));
   }
-  const VertexId v = structure_.AddVertex(near == kNoVertex ? nearest.vertex : near, position);
-  planar_->AddVertex(place, 0);
+  return NewOnSegment{.place = place, .position = position, .near = near == kNoVertex ? nearest.vertex : near};
+}
+
+void PlaneMesher::AddOnSegment(const NewOnSegment& added) {
+  const VertexId v = structure_.AddVertex(added.near, added.position);
+  planar_->AddVertex(added.place, 0);
   refinement_->VertexAdded(v);
-  return absl::OkStatus();
 }
 
 absl::StatusOr<PlaneMesher::Made> PlaneMesher::MakeSimplices(int threads, RunContext& context) {

@@ -71,7 +71,15 @@ class PlaneMesher final : public MesherOf<PlaneDomain> {
                                                                 const RunContext& context) const;
   absl::Status Split(std::span<const Subsegment> subsegments, const MeshParameters& parameters,
                      const RunContext& context);
-  absl::Status AddOnSegment(const SegmentPoint& place, VertexId near, const MeshParameters& parameters);
+  // A vertex that is to be added on a segment.
+  struct NewOnSegment {
+    SegmentPoint place;
+    Point<2> position;
+    VertexId near;
+  };
+  absl::StatusOr<NewOnSegment> CheckOnSegment(const SegmentPoint& place, VertexId near, uint64_t before,
+                                              const MeshParameters& parameters);
+  void AddOnSegment(const NewOnSegment& added);
   absl::StatusOr<std::vector<Subsegment>> MakeTriangles(PlanarDomain::Chains chains, int threads, RunContext& context);
 
   LargestArea least_area_;  // of the largest areas in faces that are meshed
