@@ -1,5 +1,6 @@
 #include "server/sessions/other_owners.h"
 
+#include <atomic>
 #include <chrono>
 #include <future>
 #include <memory>
@@ -55,11 +56,22 @@ absl::Status OtherOwners::Find(const std::string& tenant, const std::string& nam
   if (IsLate()) {
     return Unknown(name);
   }
-  const auto found = std::make_shared<std::promise<absl::Status>>();
-  std::future<absl::Status> answer = found->get_future();
-  thread_->Post([this, tenant, name, found] { found->set_value(RunGuarded([&] { return LookFor(tenant, name); })); });
-  return answer.wait_for(absl::ToChronoMilliseconds(kMostWait)) == std::future_status::ready ? answer.get()
-                                                                                             : Unknown(name);
+  struct Question {
+    std::promise<absl::Status> found;
+    std::atomic<bool> is_given_up = false;  // so that no line of them grows
+  };
+  const auto question = std::make_shared<Question>();
+  std::future<absl::Status> answer = question->found.get_future();
+  thread_->Post([this, tenant, name, question] {
+    if (!question->is_given_up) {
+      question->found.set_value(RunGuarded([&] { return LookFor(tenant, name); }));
+    }
+  });
+  if (answer.wait_for(absl::ToChronoMilliseconds(kMostWait)) != std::future_status::ready) {
+    question->is_given_up = true;
+    return Unknown(name);
+  }
+  return answer.get();
 }
 
 void OtherOwners::LookAgain() {

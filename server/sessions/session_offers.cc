@@ -51,6 +51,12 @@ std::shared_ptr<Job> Session::GiveAway(const std::string& address) {
   std::shared_ptr<Operation> waiting;
   {
     absl::MutexLock change_lock(&change_mutex_);
+    {
+      absl::MutexLock lock(&mutex_);
+      if (occupancy_.is_closed && !occupancy_.is_elsewhere) {
+        return nullptr;  // this server has deleted it
+      }
+    }
     NoteElsewhere(address);
     absl::MutexLock lock(&mutex_);
     if (occupancy_.busy == Busy::kOperation && operations_.back()->IsQueued()) {

@@ -95,6 +95,9 @@ absl::StatusOr<std::shared_ptr<Operation>> Session::ResumeOperation() {
   absl::Status refusal = operation->RefusalToResume();
   if (refusal.ok()) {
     refusal = LoadInputs();  // which its work needs
+    if (absl::IsUnavailable(refusal)) {
+      return refusal;  // of the store, not of the operation
+    }
   }
   const auto record = std::make_shared<const store::v1::OperationRecord>(
       refusal.ok() ? operation->Record() : operation->RecordOfFailure(clock_.wall(), refusal));

@@ -64,7 +64,7 @@ absl::Status WorkOffers::Settle(const std::vector<std::shared_ptr<Session>>& off
 
 void WorkOffers::GiveAway(const std::shared_ptr<Session>& session, const std::string& address) {
   const std::shared_ptr<Job> job = session->GiveAway(address);
-  if (!environment_.sessions.Remove(*session)) {
+  if (!session->IsElsewhere() || !environment_.sessions.Remove(*session)) {
     return;  // this process has deleted it
   }
   ++given_;
@@ -94,10 +94,17 @@ void WorkOffers::Choose(const std::vector<Candidate>& waiting) {
 
 // All that one look has found are committed together.
 void WorkOffers::Set(const std::shared_ptr<Session>& session, bool stands) {
-  environment_.blocking.Run(session->name(), [this, session, stands] {
-    if (session->SetOffer(stands).ok() && stands) {
-      ++offered_;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!asked_.insert(session->name()).second) {
+      return;  // the store lets it wait
     }
+  }
+  environment_.blocking.Run(session->name(), [this, session, stands] {
+    const absl::Status set = RunGuarded([&] { return session->SetOffer(stands); });
+    offered_ += set.ok() && stands ? 1 : 0;
+    const std::lock_guard lock(mutex_);
+    asked_.erase(session->name());
   });
 }
 

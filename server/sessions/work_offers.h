@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <mutex>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -61,6 +63,8 @@ class WorkOffers {
   std::atomic<uint64_t> given_ = 0;
   // Of the thread that looks: since when operations wait here, by their names; since boot.
   std::map<std::string, absl::Duration> since_;
+  std::mutex mutex_;
+  std::set<std::string> asked_;  // guarded by mutex_: sessions of which an offer is being changed
 };
 
 }  // namespace wellspace::server

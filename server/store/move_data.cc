@@ -137,6 +137,11 @@ absl::Status PutAside(PostgresLink& link, const Mover& mover) {
   });
 }
 
+// The folder may take its time between two statements: the database is not to end the transaction for that.
+void WaitWithoutEnd(pqxx::dbtransaction& transaction) {
+  transaction.exec0("SET LOCAL idle_in_transaction_session_timeout = 0");
+}
+
 // Writes a database into the folder, which is none of a server's as long as the folder belongs to PostgreSQL.
 absl::Status WriteTables(PostgresLink& link, const DataPaths& paths, FileSystem& files, const Mover& mover) {
   WELLSPACE_RETURN_IF_ERROR(RemoveIfThere(files, paths.database()));
@@ -144,6 +149,7 @@ absl::Status WriteTables(PostgresLink& link, const DataPaths& paths, FileSystem&
   WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<SessionTables> tables,
                              SessionTables::Open(paths.database(), {.files = &files}));
   return link.Read([&](pqxx::dbtransaction& transaction) {
+    WaitWithoutEnd(transaction);
     return tables->Fill(static_cast<uint64_t>(mover.epoch),
                         [&](RecordRows& rows) { return sql::CopyRows(transaction, mover.epoch, rows); });
   });
@@ -170,6 +176,7 @@ absl::Status MoveToPostgres(const std::string& folder, const PostgresOptions& da
   WELLSPACE_RETURN_IF_ERROR(OpenPostgresSchema(link));
   Pairing pairing;
   const absl::Status copied = link.Transact([&](pqxx::dbtransaction& transaction) -> absl::Status {
+    WaitWithoutEnd(transaction);
     WELLSPACE_RETURN_IF_ERROR(LockOut(transaction));
     WELLSPACE_RETURN_IF_ERROR(ClearFor(transaction, *opened, pairing));
     // Files have epochs in their names: no owner there gets one that an owner here has had.

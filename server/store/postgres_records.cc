@@ -170,6 +170,15 @@ absl::Status PostgresRecords::NoteFailure(const absl::Status& status) {
   return absl::IsDataLoss(status) ? health_->Fail(status) : status;
 }
 
+absl::Status PostgresRecords::ChangeOwners(PostgresLink& link, const PostgresLink::Work& work) {
+  absl::Status of_work;
+  const absl::Status status = link.Transact([&](pqxx::dbtransaction& transaction) {
+    of_work = work(transaction);
+    return of_work;
+  });
+  return of_work.ok() ? NoteFailure(status) : status;
+}
+
 absl::StatusOr<StoredSessions> PostgresRecords::Load() {
   StoredSessions stored;
   const absl::Status loaded = reading_.Read([&](pqxx::dbtransaction& transaction) -> absl::Status {
@@ -188,7 +197,7 @@ absl::StatusOr<StoredSessions> PostgresRecords::Load() {
 absl::StatusOr<std::optional<StoredSession>> PostgresRecords::Take(const std::string& session) {
   WELLSPACE_RETURN_IF_ERROR(health_->Check());
   std::optional<StoredSession> taken;
-  WELLSPACE_RETURN_IF_ERROR(NoteFailure(writing_.Transact([&](pqxx::dbtransaction& transaction) -> absl::Status {
+  WELLSPACE_RETURN_IF_ERROR(ChangeOwners(writing_, [&](pqxx::dbtransaction& transaction) -> absl::Status {
     taken.reset();
     const pqxx::result rows = transaction.exec_prepared(sql::kTakeSession, session, lease_.owner());
     if (rows.empty()) {
@@ -197,7 +206,7 @@ absl::StatusOr<std::optional<StoredSession>> PostgresRecords::Take(const std::st
     WELLSPACE_ASSIGN_OR_RETURN(taken, ParseSession(rows[0]));
     const auto id = rows[0][0].as<int64_t>();
     return LoadSteps(transaction, absl::StrCat(id), {&*taken, 1}, {&id, 1});
-  })));
+  }));
   return taken;
 }
 
@@ -213,7 +222,7 @@ absl::StatusOr<std::vector<StoredSession>> PostgresRecords::TakeOrphans() {
   if (!has_dead) {
     return taken;
   }
-  WELLSPACE_RETURN_IF_ERROR(NoteFailure(reading_.Transact([&](pqxx::dbtransaction& transaction) -> absl::Status {
+  WELLSPACE_RETURN_IF_ERROR(ChangeOwners(reading_, [&](pqxx::dbtransaction& transaction) -> absl::Status {
     // Not that of this process: one that it has had may be that of a session which it gets back.
     const auto epoch = transaction.exec1("SELECT nextval('wellspace.epochs')")[0].as<uint64_t>();
     TakeFromTheDead(transaction, lease_.owner(), epoch, is_steady);
@@ -222,7 +231,7 @@ absl::StatusOr<std::vector<StoredSession>> PostgresRecords::TakeOrphans() {
     WELLSPACE_ASSIGN_OR_RETURN(
         taken, LoadSessions(transaction, absl::StrCat("owner = ", lease_.owner(), " AND epoch = ", epoch)));
     return absl::OkStatus();
-  })));
+  }));
   return taken;
 }
 
@@ -238,7 +247,7 @@ absl::StatusOr<std::vector<StoredSession>> PostgresRecords::TakeOffered(const Ro
   if (!has_offered) {
     return taken;
   }
-  WELLSPACE_RETURN_IF_ERROR(NoteFailure(reading_.Transact([&](pqxx::dbtransaction& transaction) -> absl::Status {
+  WELLSPACE_RETURN_IF_ERROR(ChangeOwners(reading_, [&](pqxx::dbtransaction& transaction) -> absl::Status {
     taken.clear();
     std::vector<int64_t> ids;
     for (const pqxx::row& row :
@@ -250,7 +259,7 @@ absl::StatusOr<std::vector<StoredSession>> PostgresRecords::TakeOffered(const Ro
                                  LoadSessions(transaction, absl::StrCat("id IN (", absl::StrJoin(ids, ","), ")")));
     }
     return absl::OkStatus();
-  })));
+  }));
   return taken;
 }
 

@@ -65,6 +65,9 @@ class PostgresRecords final : public Records {
                              Survives survives);
   // Notes a failure after which it is not known what the database has.
   absl::Status NoteFailure(const absl::Status& status);
+  // Runs `work` in a transaction that takes sessions. A damaged row of theirs is no failure of the store: they stay
+  // with their owner.
+  absl::Status ChangeOwners(PostgresLink& link, const PostgresLink::Work& work);
 
   const std::shared_ptr<StoreHealth> health_;
   // One connection each: short work does not wait for long work.
