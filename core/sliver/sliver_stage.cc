@@ -267,7 +267,7 @@ absl::StatusOr<WeightedSimplices> SliverStage<D>::ToSimplices(const QueryStructu
   }
   statistics_.measured += rows_.rows();
   if constexpr (D == 3) {
-    const WorstShapes::Worst worst = shapes_.Find(triangulation);
+    WELLSPACE_ASSIGN_OR_RETURN(const WorstShapes::Worst worst, shapes_.Find(triangulation, context));
     simplices.max_radius_edge = worst.max_radius_edge;
     simplices.min_angle_deg = worst.min_angle_deg;
   }
@@ -297,7 +297,7 @@ absl::StatusOr<std::optional<SimplexChanges>> SliverStage<D>::Update(std::span<c
   }
   changes.edits = rows_.Change(changed, is_in);
   statistics_.measured += shapes_.Update(triangulation, changed);
-  const WorstShapes::Worst worst = shapes_.Find(triangulation);
+  WELLSPACE_ASSIGN_OR_RETURN(const WorstShapes::Worst worst, shapes_.Find(triangulation, context));
   changes.worst = SimplexChanges::Worst::kOfAll;
   changes.max_radius_edge = worst.max_radius_edge;
   changes.min_angle_deg = worst.min_angle_deg;

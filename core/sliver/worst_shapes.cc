@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/status_macros.h"
 #include "core/simplex/quality.h"
 #include "core/sliver/tetrahedron.h"
 
@@ -74,7 +75,8 @@ void WorstShapes::SumUp(size_t group) {
   }
 }
 
-auto WorstShapes::Find(const Triangulation<3>& triangulation) const -> Worst {
+auto WorstShapes::Find(const Triangulation<3>& triangulation, const RunContext& context) const
+    -> absl::StatusOr<Worst> {
   // The largest that are finite: where one is not, more are looked at than need be.
   Measures largest;
   for (const Measures& group : groups_) {
@@ -93,6 +95,7 @@ auto WorstShapes::Find(const Triangulation<3>& triangulation) const -> Worst {
     if (!may_be_worst(blocks_[block])) {
       continue;
     }
+    WELLSPACE_RETURN_IF_ERROR(context.Check());
     const uint32_t end = std::min<uint32_t>(triangulation.simplex_limit(), (block + 1) * kBlock);
     for (uint32_t i = block * kBlock; i < end; ++i) {
       if (!triangulation.IsIn(SimplexId{i})) {

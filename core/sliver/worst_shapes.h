@@ -7,7 +7,9 @@
 #include <span>
 #include <vector>
 
+#include "absl/status/statusor.h"
 #include "core/base/memory/huge_pages.h"
+#include "core/base/run_context.h"
 #include "core/sliver/triangulation.h"
 
 namespace wellspace::core {
@@ -35,8 +37,9 @@ class WorstShapes {
 
   // The worst of all simplices, to the bit what RadiusEdgeRatio and Angles have for them.
   //
-  // Complexity: O(limit / 2048), and expected O(1) blocks.
-  Worst Find(const Triangulation<3>& triangulation) const;
+  // Complexity: O(limit / 2048), and expected O(1) blocks; all where simplices are congruent.
+  // Errors:     CANCELLED, DEADLINE_EXCEEDED.
+  absl::StatusOr<Worst> Find(const Triangulation<3>& triangulation, const RunContext& context) const;
 
   uint64_t MemoryBytes() const { return blocks_.size() * sizeof(Measures) + groups_.size() * sizeof(Measures); }
 

@@ -235,6 +235,35 @@ TEST_F(BoxedMeshesTest, TrianglesInASideHaveTheirMarkers) {
   EXPECT_NEAR(area, 0.25, 1e-12);
 }
 
+TEST_F(BoxedMeshesTest, ANegativeZeroThatIsLedOntoASideIsThere) {
+  test::TestSurface surface;
+  surface.AddPolygon({{0.25, 0.25, -0.0}, {0.75, 0.25, -0.0}, {0.75, 0.75, -0.0}, {0.25, 0.75, -0.0}}, 5);
+  SurfaceFeatures features = InBox(surface, {{0, 0, -1e-5}, {1, 1, 1}});
+  features.weld = 1e-4;
+  const absl::StatusOr<Mesh> mesh = MeshIn(surface, features);
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  for (size_t at = 2; at < mesh->points.size(); at += 3) {
+    EXPECT_TRUE(mesh->points[at] == -1e-5 || mesh->points[at] > 1e-3) << mesh->points[at];
+  }
+}
+
+// Side triangles, which are not given, are the fewer ones then.
+TEST_F(BoxedMeshesTest, TrianglesInASideThatLookInwardsAreToldByGivenOnes) {
+  test::TestSurface surface;
+  AddSheet(surface, 0, 1, 12, 5, [](double, double) { return 0.0; });
+  for (const bool inwards : {false, true}) {
+    SurfaceFeatures features = InBox(surface);
+    const absl::StatusOr<SurfaceReport> report = InspectSurface(surface.points, features, 1, RunContext());
+    ASSERT_TRUE(report.ok()) << report.status();
+    for (const uint32_t triangle : report->flipped_at.triangles) {
+      EXPECT_LT(triangle, surface.corners.size() / 3);
+    }
+    for (size_t i = 0; !inwards && i < surface.corners.size(); i += 3) {
+      std::swap(surface.corners[i], surface.corners[i + 1]);
+    }
+  }
+}
+
 TEST_F(BoxedMeshesTest, ABoxFarFromTheOriginWithOddSides) {
   const Box<3> box{{1000.1, -50.3, 7.7}, {1001.3, -49.6, 8.6}};
   test::TestSurface surface;

@@ -149,7 +149,7 @@ TEST_F(OwnershipTest, AnOfferEndsWithTheBeginOfTheWork) {
   const std::shared_ptr<Operation> cancelled = process.Start();
   EXPECT_FALSE(session.GetWaiting()->is_read);
   {
-    const std::shared_ptr<const MeshSnapshot> read = session.mesh();
+    const std::shared_ptr<const MeshSnapshot> read = session.meshes().last();
     EXPECT_TRUE(session.GetWaiting()->is_read);
   }
   EXPECT_TRUE(session.GetWaiting()->has_structure);
