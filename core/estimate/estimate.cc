@@ -46,7 +46,7 @@ template <int D>
 constexpr double kTypicalRho = D == 2 ? std::numbers::sqrt2 : 2;
 constexpr double kTypicalInLeaf = 12;
 constexpr double kTypicalRoom = 1.2;
-constexpr double kMostTypicalBytes = 64e6;
+constexpr double kMostTypicalBytes = 32e6;
 
 // More vertices than any leaf is predicted to take.
 constexpr double kMostInLeaf = 0x1p400;

@@ -157,7 +157,7 @@ class Mesher {
   // The same for a reservation of memory: it may be farther from the truth, and for small meshes of clouds goes by
   // numbers alone, with room for uneven ones.
   //
-  // Complexity: below a twentieth of the time of the mesh of a cloud.
+  // Complexity: a few hundredths of the time of the mesh of a cloud.
   // Errors:     as Estimate.
   virtual absl::StatusOr<MeshEstimate> EstimateToReserve(const MeshParameters& parameters,
                                                          const RunContext& context) const {

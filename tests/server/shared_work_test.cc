@@ -62,7 +62,7 @@ class Replica {
       : metrics_(absl::StrCat("127.0.0.1:", FreePort())), address_(std::move(address)) {
     options.insert(options.end(),
                    {"--small-workers", "0", "--grace", "1", "--listen", address_, "--metrics-listen", metrics_});
-    daemon_ = std::make_unique<Daemon>(options, errors, "", Daemon::Listen::kAsTold);
+    daemon_ = std::make_unique<Daemon>(options, errors, std::vector<std::string>(), Daemon::Listen::kAsTold);
   }
 
   Daemon& operator*() { return *daemon_; }
