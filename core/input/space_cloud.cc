@@ -308,7 +308,9 @@ class CloudMaker {
       }
     }
     place_of_kept_ = {};
-    TakeOtherCorners();
+    if (features_.solids == SolidRule::kBox) {
+      TakeOtherCorners();
+    }
     return absl::OkStatus();
   }
 
