@@ -308,14 +308,15 @@ class CloudMaker {
       }
     }
     place_of_kept_ = {};
-    if (features_.solids == SolidRule::kBox) {
-      TakeOtherCorners();
-    }
+    TakeOtherCorners();
     return absl::OkStatus();
   }
 
   // Takes the corners that are no given points: of a box, and where its edges are crossed.
   void TakeOtherCorners() {
+    if (features_.solids != SolidRule::kBox) {
+      return;
+    }
     for (uint32_t number = 0; number < curves().corners.size(); ++number) {
       const uint32_t point = curves().corners[number];
       if (first_of_point_[point] == kNoFirst) {
