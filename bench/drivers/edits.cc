@@ -16,38 +16,12 @@
 #include "CLI/Formatter.hpp"
 #include "absl/strings/str_cat.h"
 #include "bench/drivers/meter.h"
+#include "bench/drivers/results.h"
 #include "core/meshers/mesher.h"
 #include "nlohmann/json.hpp"
 
 namespace wellspace::bench {
 namespace {
-
-template <typename T>
-T OrExit(absl::StatusOr<T> result) {
-  if (!result.ok()) {
-    std::cerr << "wellspace: " << result.status() << '\n';
-    std::exit(1);
-  }
-  return *std::move(result);
-}
-
-void ExitUnless(const absl::Status& status) {
-  if (!status.ok()) {
-    std::cerr << "wellspace: " << status << '\n';
-    std::exit(1);
-  }
-}
-
-// FNV-1a of the words of `values`, after `hash`.
-template <typename Values>
-uint64_t Hash(const Values& values, uint64_t hash) {
-  for (const auto value : values) {
-    uint64_t word = 0;
-    std::memcpy(&word, &value, sizeof(value));
-    hash = (hash ^ word) * 0x100000001b3;
-  }
-  return hash;
-}
 
 // Meshes that are equal to the bit, in the order of their rows, have equal ones.
 uint64_t FingerprintOf(const core::Mesh& mesh, uint64_t hash) {
@@ -120,7 +94,7 @@ Parts Edit(const Options& options, core::Mesher& mesher, core::Mesh& mesh, uint6
   Places places;
   Parts parts;
   std::vector<double> added(static_cast<size_t>(options.batch) * options.dimension);
-  fingerprint = FingerprintOf(mesh, 0xcbf29ce484222325);
+  fingerprint = FingerprintOf(mesh, kFirstHash);
   for (int edit = 0; edit < options.edits; ++edit) {
     std::ranges::generate(added, [&] { return places.Next(); });
     const double start = Now();

@@ -16,6 +16,7 @@
 #include "absl/strings/str_cat.h"
 #include "bench/drivers/floor.h"
 #include "bench/drivers/meter.h"
+#include "bench/drivers/results.h"
 #include "core/meshers/mesher.h"
 #include "core/validate/validate.h"
 #include "core/validate/validate_domain.h"
@@ -24,30 +25,10 @@
 namespace wellspace::bench {
 namespace {
 
-template <typename T>
-T OrExit(absl::StatusOr<T> result) {
-  if (!result.ok()) {
-    std::cerr << "wellspace: " << result.status() << '\n';
-    std::exit(1);
-  }
-  return *std::move(result);
-}
-
-// FNV-1a of the words of `values`, after `hash`.
-template <typename T>
-uint64_t Hash(std::span<const T> values, uint64_t hash) {
-  for (const T value : values) {
-    uint64_t word = 0;
-    std::memcpy(&word, &value, sizeof(value));
-    hash = (hash ^ word) * 0x100000001b3;
-  }
-  return hash;
-}
-
 // Equal meshes have equal ones.
 std::string FingerprintOf(const core::Mesh& mesh) {
-  const uint64_t of_points = Hash<double>(mesh.points, 0xcbf29ce484222325);
-  return absl::StrCat(absl::Hex(Hash<uint32_t>(mesh.simplices, of_points), absl::kZeroPad16));
+  const uint64_t of_points = Hash(mesh.points, kFirstHash);
+  return absl::StrCat(absl::Hex(Hash(mesh.simplices, of_points), absl::kZeroPad16));
 }
 
 absl::StatusOr<std::unique_ptr<core::Mesher>> Create(const core::MeshParameters& parameters,
