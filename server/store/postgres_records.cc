@@ -94,7 +94,7 @@ void TakeFromTheDead(pqxx::dbtransaction& transaction, int64_t owner, uint64_t e
                              owner, epoch, id);
     transaction.exec_params0("DELETE FROM wellspace.owners WHERE id = $1", id);
   }
-  // Nobody looks for the numbers of transactions of a day ago. A link that is in use writes its own anew.
+  // No server looks for the numbers of transactions of a day ago. A link that is in use writes its own anew.
   transaction.exec0(
       "DELETE FROM wellspace.commits WHERE link IN (SELECT link FROM wellspace.commits"
       " WHERE time < clock_timestamp() - interval '1 day' FOR UPDATE SKIP LOCKED)");

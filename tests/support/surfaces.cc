@@ -88,6 +88,31 @@ void TestSurface::AddPolygon(const std::vector<core::Point<3>>& polygon, int32_t
   }
 }
 
+void TestSurface::AddSheet(double low, double high, int steps, int32_t marker,
+                           const std::function<double(double, double)>& height) {
+  std::vector<uint32_t> numbers;
+  for (int i = 0; i <= steps; ++i) {
+    for (int k = 0; k <= steps; ++k) {
+      const double x = low + (high - low) * i / steps;
+      const double y = low + (high - low) * k / steps;
+      numbers.push_back(AddPoint({x, y, height(x, y)}));
+    }
+  }
+  for (int i = 0; i < steps; ++i) {
+    for (int k = 0; k < steps; ++k) {
+      const auto at = [&](int di, int dk) { return numbers[static_cast<size_t>((i + di) * (steps + 1) + k + dk)]; };
+      AddTriangle({at(0, 0), at(1, 0), at(1, 1)}, marker);
+      AddTriangle({at(0, 0), at(1, 1), at(0, 1)}, marker);
+    }
+  }
+}
+
+TestSurface Sheet(double low, double high, int steps, const std::function<double(double, double)>& height) {
+  TestSurface surface;
+  surface.AddSheet(low, high, steps, 7, height);
+  return surface;
+}
+
 core::SurfaceFeatures TestSurface::Features() const {
   core::SurfaceFeatures features;
   features.corners = corners;

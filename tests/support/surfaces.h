@@ -23,6 +23,9 @@ struct TestSurface {
   void AddTriangle(const std::array<uint32_t, 3>& of, int32_t marker = 0);
   // A fan from the first corner.
   void AddPolygon(const std::vector<core::Point<3>>& polygon, int32_t marker = 0);
+  // A sheet of steps x steps squares, of two triangles each, over a square from `low` to `high`, at a height.
+  void AddSheet(double low, double high, int steps, int32_t marker,
+                const std::function<double(double, double)>& height);
   uint64_t triangle_count() const { return corners.size() / 3; }
   // REQUIRES:   this outlives the result.
   core::SurfaceFeatures Features() const;
@@ -36,6 +39,8 @@ TestSurface Boxes(const std::vector<double>& x, const std::vector<double>& y, co
 TestSurface Cube();
 // A sphere of 20 * 4^depth triangles.
 TestSurface Sphere(int depth, const core::Point<3>& centre = {0, 0, 0}, double radius = 1);
+// A sheet with the marker 7.
+TestSurface Sheet(double low, double high, int steps, const std::function<double(double, double)>& height);
 // The part `name` of tests/data/surfaces; its faces have fourth numbers for markers, or none.
 TestSurface SurfaceOf(const std::string& name);
 // Every triangle as four.

@@ -25,27 +25,6 @@ BoxedSurface Boxed(const test::TestSurface& surface, const Box<3>& box = kBox, d
   return *CutAtBox(complex, box, weld, std::max(weld, kReach), 0, context);
 }
 
-// A sheet of steps x steps squares, of two triangles each, over a square from `low` to `high`, at a height.
-test::TestSurface Sheet(double low, double high, int steps, double (*height)(double, double)) {
-  test::TestSurface surface;
-  std::vector<uint32_t> numbers;
-  for (int i = 0; i <= steps; ++i) {
-    for (int k = 0; k <= steps; ++k) {
-      const double x = low + (high - low) * i / steps;
-      const double y = low + (high - low) * k / steps;
-      numbers.push_back(surface.AddPoint({x, y, height(x, y)}));
-    }
-  }
-  for (int i = 0; i < steps; ++i) {
-    for (int k = 0; k < steps; ++k) {
-      const auto at = [&](int di, int dk) { return numbers[static_cast<size_t>((i + di) * (steps + 1) + k + dk)]; };
-      surface.AddTriangle({at(0, 0), at(1, 0), at(1, 1)}, 7);
-      surface.AddTriangle({at(0, 0), at(1, 1), at(0, 1)}, 7);
-    }
-  }
-  return surface;
-}
-
 // Checks that triangles of the complex meet in common corners and edges alone, and lie in the box.
 void ExpectSound(const BoxedSurface& boxed, const Box<3>& box = kBox) {
   ASSERT_FALSE(boxed.do_meet);
@@ -76,7 +55,7 @@ class BoxedSurfaceTest : public test::SeededTest {
 };
 
 TEST_F(BoxedSurfaceTest, ASheetThatEndsAtTheSidesPartsTheBox) {
-  const BoxedSurface boxed = Boxed(Sheet(0, 1, 3, [](double, double) { return 0.25; }));
+  const BoxedSurface boxed = Boxed(test::Sheet(0, 1, 3, [](double, double) { return 0.25; }));
   ExpectSound(boxed);
   EXPECT_EQ(boxed.cut_triangles, 0u);
   EXPECT_EQ(boxed.outside_triangles, 0u);
@@ -87,7 +66,8 @@ TEST_F(BoxedSurfaceTest, ASheetThatEndsAtTheSidesPartsTheBox) {
 }
 
 TEST_F(BoxedSurfaceTest, ASheetThatSticksOutIsCut) {
-  const test::TestSurface sheet = Sheet(-0.37, 1.4, 5, [](double x, double y) { return 0.3 + 0.2 * x + 0.1 * y; });
+  const test::TestSurface sheet =
+      test::Sheet(-0.37, 1.4, 5, [](double x, double y) { return 0.3 + 0.2 * x + 0.1 * y; });
   const BoxedSurface boxed = Boxed(sheet);
   ExpectSound(boxed);
   EXPECT_GT(boxed.cut_triangles, 0u);
@@ -137,7 +117,7 @@ TEST_F(BoxedSurfaceTest, ATriangleInASideTakesItsPlace) {
 }
 
 TEST_F(BoxedSurfaceTest, WhatIsOutsideIsDropped) {
-  test::TestSurface surface = Sheet(0, 1, 2, [](double, double) { return 0.5; });
+  test::TestSurface surface = test::Sheet(0, 1, 2, [](double, double) { return 0.5; });
   surface.AddPolygon({{2, 2, 2}, {3, 2, 2}, {2, 3, 2}});
   surface.AddPolygon({{1, 0.1, 0.1}, {1, 0.9, 0.1}, {2, 0.5, 0.1}});      // touches a side from outside
   surface.AddPolygon({{1.7, 0.5, 0.5}, {0.5, 1.7, 0.5}, {1.5, 1.5, 0}});  // beyond an edge of the box
@@ -151,7 +131,7 @@ TEST_F(BoxedSurfaceTest, WhatIsOutsideIsDropped) {
 }
 
 TEST_F(BoxedSurfaceTest, WeldingMovesPointsOntoSides) {
-  const test::TestSurface sheet = Sheet(1e-7, 1 - 1e-7, 2, [](double, double) { return 0.5; });
+  const test::TestSurface sheet = test::Sheet(1e-7, 1 - 1e-7, 2, [](double, double) { return 0.5; });
   EXPECT_EQ(VolumesOf(Boxed(sheet)).size(), 1u) << "a membrane that ends before the sides";
   const BoxedSurface boxed = Boxed(sheet, kBox, 1e-6);
   ExpectSound(boxed);
@@ -171,7 +151,7 @@ TEST_F(BoxedSurfaceTest, TrianglesThatMeetInASideLeaveTheSidesOut) {
 
 TEST_F(BoxedSurfaceTest, NoOrderChangesABit) {
   const test::TestSurface surface =
-      test::Joined(Sheet(-0.3, 1.3, 9, [](double x, double y) { return 0.3 + 0.1 * std::sin(3 * x + y); }),
+      test::Joined(test::Sheet(-0.3, 1.3, 9, [](double x, double y) { return 0.3 + 0.1 * std::sin(3 * x + y); }),
                    test::Sphere(2, {0.9, 0.8, 0.9}, 0.31));
   const BoxedSurface first = Boxed(surface);
   ExpectSound(first);
@@ -259,7 +239,7 @@ TEST_F(BoxedSurfaceTest, WhatMeetsInASideMeetsInSpace) {
 }
 
 TEST_F(BoxedSurfaceTest, IsCancelled) {
-  const test::TestSurface sheet = Sheet(0, 1, 3, [](double, double) { return 0.25; });
+  const test::TestSurface sheet = test::Sheet(0, 1, 3, [](double, double) { return 0.25; });
   RunContext context;
   const SurfaceComplex complex = *MakeSurfaceComplex(sheet.points, {}, sheet.Features(), context);
   context.Cancel();

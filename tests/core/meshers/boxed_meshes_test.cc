@@ -32,33 +32,6 @@ using ::testing::IsSupersetOf;
 
 constexpr Box<3> kBox{{0, 0, 0}, {1, 1, 1}};
 
-// A sheet of steps x steps squares, of two triangles each, over a square from `low` to `high`, at a height.
-template <typename Height>
-void AddSheet(test::TestSurface& surface, double low, double high, int steps, int32_t marker, const Height& height) {
-  std::vector<uint32_t> numbers;
-  for (int i = 0; i <= steps; ++i) {
-    for (int k = 0; k <= steps; ++k) {
-      const double x = low + (high - low) * i / steps;
-      const double y = low + (high - low) * k / steps;
-      numbers.push_back(surface.AddPoint({x, y, height(x, y)}));
-    }
-  }
-  for (int i = 0; i < steps; ++i) {
-    for (int k = 0; k < steps; ++k) {
-      const auto at = [&](int di, int dk) { return numbers[static_cast<size_t>((i + di) * (steps + 1) + k + dk)]; };
-      surface.AddTriangle({at(0, 0), at(1, 0), at(1, 1)}, marker);
-      surface.AddTriangle({at(0, 0), at(1, 1), at(0, 1)}, marker);
-    }
-  }
-}
-
-template <typename Height>
-test::TestSurface Sheet(double low, double high, int steps, const Height& height) {
-  test::TestSurface surface;
-  AddSheet(surface, low, high, steps, 7, height);
-  return surface;
-}
-
 MeshParameters Parameters() {
   MeshParameters parameters;
   parameters.max_vertices = 50'000;
@@ -132,7 +105,7 @@ class BoxedMeshesTest : public test::SeededTest {
 };
 
 TEST_F(BoxedMeshesTest, AFlatSheetPartsTheBox) {
-  const test::TestSurface surface = Sheet(0, 1, 3, [](double, double) { return 0.3; });
+  const test::TestSurface surface = test::Sheet(0, 1, 3, [](double, double) { return 0.3; });
   const SurfaceFeatures features = InBox(surface);
   const absl::StatusOr<Mesh> mesh = MeshIn(surface, features);
   ASSERT_TRUE(mesh.ok()) << mesh.status();
@@ -149,7 +122,8 @@ TEST_F(BoxedMeshesTest, AFlatSheetPartsTheBox) {
 }
 
 TEST_F(BoxedMeshesTest, ATiltedSheetThatSticksOut) {
-  const test::TestSurface surface = Sheet(-0.41, 1.3, 5, [](double x, double y) { return 0.2 + 0.3 * x + 0.2 * y; });
+  const test::TestSurface surface =
+      test::Sheet(-0.41, 1.3, 5, [](double x, double y) { return 0.2 + 0.3 * x + 0.2 * y; });
   const SurfaceFeatures features = InBox(surface);
   const absl::StatusOr<Mesh> mesh = MeshIn(surface, features);
   ASSERT_TRUE(mesh.ok()) << mesh.status();
@@ -162,8 +136,8 @@ TEST_F(BoxedMeshesTest, ATiltedSheetThatSticksOut) {
 
 TEST_F(BoxedMeshesTest, TwoHorizonsMakeThreeRegions) {
   test::TestSurface surface;
-  AddSheet(surface, -0.2, 1.2, 4, 1, [](double x, double) { return 0.3 + 0.1 * x; });
-  AddSheet(surface, -0.1, 1.15, 3, 2, [](double, double y) { return 0.75 - 0.15 * y; });
+  surface.AddSheet(-0.2, 1.2, 4, 1, [](double x, double) { return 0.3 + 0.1 * x; });
+  surface.AddSheet(-0.1, 1.15, 3, 2, [](double, double y) { return 0.75 - 0.15 * y; });
   const Box<3> box{{0, 0, 0}, {1, 1, 1}};
   const SurfaceFeatures features = InBox(surface, box);
   const absl::StatusOr<Mesh> mesh = MeshIn(surface, features);
@@ -176,8 +150,8 @@ TEST_F(BoxedMeshesTest, TwoHorizonsMakeThreeRegions) {
 }
 
 TEST_F(BoxedMeshesTest, SeedsNameRegionsAndHoles) {
-  test::TestSurface surface = Sheet(0, 1, 1, [](double, double) { return 0.25; });
-  AddSheet(surface, 0, 1, 1, 8, [](double, double) { return 0.75; });
+  test::TestSurface surface = test::Sheet(0, 1, 1, [](double, double) { return 0.25; });
+  surface.AddSheet(0, 1, 1, 8, [](double, double) { return 0.75; });
   SurfaceFeatures features = InBox(surface);
   const std::vector<SolidSeed> seeds = {{.at = {0.5, 0.5, 0.1}, .region = 4}, {.at = {0.5, 0.5, 0.9}, .is_hole = true}};
   features.seeds = seeds;
@@ -250,7 +224,7 @@ TEST_F(BoxedMeshesTest, ANegativeZeroThatIsLedOntoASideIsThere) {
 // Side triangles, which are not given, are the fewer ones then.
 TEST_F(BoxedMeshesTest, TrianglesInASideThatLookInwardsAreToldByGivenOnes) {
   test::TestSurface surface;
-  AddSheet(surface, 0, 1, 12, 5, [](double, double) { return 0.0; });
+  surface.AddSheet(0, 1, 12, 5, [](double, double) { return 0.0; });
   for (const bool inwards : {false, true}) {
     SurfaceFeatures features = InBox(surface);
     const absl::StatusOr<SurfaceReport> report = InspectSurface(surface.points, features, 1, RunContext());
@@ -277,7 +251,7 @@ TEST_F(BoxedMeshesTest, ABoxFarFromTheOriginWithOddSides) {
 }
 
 TEST_F(BoxedMeshesTest, TheCheckFindsFaults) {
-  const test::TestSurface surface = Sheet(-0.2, 1.2, 4, [](double, double) { return 0.3; });
+  const test::TestSurface surface = test::Sheet(-0.2, 1.2, 4, [](double, double) { return 0.3; });
   const SurfaceFeatures features = InBox(surface);
   const Mesh mesh = *MeshIn(surface, features);
   std::vector<int32_t> tags;
@@ -298,10 +272,10 @@ TEST_F(BoxedMeshesTest, TheCheckFindsFaults) {
   EXPECT_EQ(check(surface, kBox), "");
   EXPECT_THAT(check(surface, {{0, 0, 0}, {1, 1, 0.9}}), HasSubstr("is outside of the box"));
   EXPECT_THAT(check(surface, {{0, 0, 0}, {1, 1, 1.1}}), HasSubstr("the tetrahedra have a volume of"));
-  const test::TestSurface higher = Sheet(-0.2, 1.2, 4, [](double, double) { return 0.31; });
+  const test::TestSurface higher = test::Sheet(-0.2, 1.2, 4, [](double, double) { return 0.31; });
   EXPECT_THAT(check(higher, kBox), HasSubstr("away from all triangles"));
   test::TestSurface more = surface;
-  AddSheet(more, -0.2, 1.2, 1, 9, [](double, double) { return 0.6; });
+  more.AddSheet(-0.2, 1.2, 1, 9, [](double, double) { return 0.6; });
   EXPECT_THAT(check(more, kBox), HasSubstr("away from all facets"));
   // A facet of the sheet with the name of a side, one in a side with the name of another one, and of the sheet.
   const size_t of_sheet = mesh.facet_count() - 1;  // markers above 0 keep their numbers: 7 is the last tag
@@ -319,7 +293,8 @@ TEST_F(BoxedMeshesTest, TheCheckFindsFaults) {
 }
 
 TEST_F(BoxedMeshesTest, NeitherOrderNorThreadsChangeABit) {
-  test::TestSurface surface = Sheet(-0.2, 1.2, 4, [](double x, double y) { return 0.5 + 0.1 * std::sin(4 * x + y); });
+  test::TestSurface surface =
+      test::Sheet(-0.2, 1.2, 4, [](double x, double y) { return 0.5 + 0.1 * std::sin(4 * x + y); });
   const Mesh first = *MeshIn(surface, InBox(surface));
   for (int run = 0; run < 2; ++run) {
     const test::TestSurface shuffled = test::Shuffled(surface, random_);
@@ -331,7 +306,7 @@ TEST_F(BoxedMeshesTest, NeitherOrderNorThreadsChangeABit) {
 }
 
 TEST_F(BoxedMeshesTest, PointsInTheBoxAreVertices) {
-  test::TestSurface surface = Sheet(-0.2, 1.2, 2, [](double, double) { return 0.5; });
+  test::TestSurface surface = test::Sheet(-0.2, 1.2, 2, [](double, double) { return 0.5; });
   const uint32_t inside = surface.AddPoint({0.3, 0.4, 0.2});
   const uint32_t outside = surface.AddPoint({1.3, 0.4, 0.2});
   const absl::StatusOr<Mesh> mesh = MeshIn(surface, InBox(surface));
@@ -343,7 +318,7 @@ TEST_F(BoxedMeshesTest, PointsInTheBoxAreVertices) {
 }
 
 TEST_F(BoxedMeshesTest, PointsOfTheSurfaceAreKept) {
-  const test::TestSurface surface = Sheet(-0.21, 1.23, 6, [](double, double) { return 0.5; });
+  const test::TestSurface surface = test::Sheet(-0.21, 1.23, 6, [](double, double) { return 0.5; });
   SurfaceFeatures features = InBox(surface);
   features.keeps_points = true;
   const absl::StatusOr<Mesh> mesh = MeshIn(surface, features);
@@ -362,7 +337,7 @@ std::string ErrorOf(const test::TestSurface& surface, const SurfaceFeatures& fea
 }
 
 TEST_F(BoxedMeshesTest, BadInputIsRefused) {
-  const test::TestSurface sheet = Sheet(0, 1, 2, [](double, double) { return 0.5; });
+  const test::TestSurface sheet = test::Sheet(0, 1, 2, [](double, double) { return 0.5; });
   SurfaceFeatures features = InBox(sheet);
   features.box.reset();
   EXPECT_THAT(ErrorOf(sheet, features), HasSubstr("box: solids by box need one"));
@@ -385,8 +360,8 @@ TEST_F(BoxedMeshesTest, BadInputIsRefused) {
     EXPECT_TRUE(MeshIn(near, welded).ok());
   }
   // Sheets that cross in a side, and a sheet whose edge crosses a triangle in a side.
-  test::TestSurface crossed = Sheet(0, 1, 2, [](double x, double) { return 0.3 + 0.4 * x; });
-  AddSheet(crossed, 0, 1, 2, 8, [](double x, double) { return 0.7 - 0.4 * x; });
+  test::TestSurface crossed = test::Sheet(0, 1, 2, [](double x, double) { return 0.3 + 0.4 * x; });
+  crossed.AddSheet(0, 1, 2, 8, [](double x, double) { return 0.7 - 0.4 * x; });
   EXPECT_THAT(ErrorOf(crossed, InBox(crossed)), HasSubstr("self intersections"));
   test::TestSurface lying = sheet;
   lying.AddPolygon({{0, 0.2, 0.2}, {0, 0.8, 0.2}, {0, 0.5, 0.8}}, 3);
@@ -395,12 +370,12 @@ TEST_F(BoxedMeshesTest, BadInputIsRefused) {
   covered.AddPolygon({{0, 0.1, 0.1}, {0, 0.9, 0.1}, {0, 0.5, 0.9}}, 3);
   covered.AddPolygon({{0, 0.4, 0.3}, {0, 0.6, 0.3}, {0.5, 0.5, 0.3}}, 4);
   EXPECT_THAT(ErrorOf(covered, InBox(covered)), HasSubstr("self intersections"));
-  test::TestSurface flat = Sheet(-0.5, 1.5, 1, [](double x, double) { return 0.03 * x - 0.01; });
+  test::TestSurface flat = test::Sheet(-0.5, 1.5, 1, [](double x, double) { return 0.03 * x - 0.01; });
   EXPECT_THAT(ErrorOf(flat, InBox(flat)), HasSubstr("degrees at"));
 }
 
 TEST_F(BoxedMeshesTest, MemoryIsAskedForAndTheRunCancelled) {
-  const test::TestSurface surface = Sheet(-0.2, 1.2, 60, [](double, double) { return 0.5; });
+  const test::TestSurface surface = test::Sheet(-0.2, 1.2, 60, [](double, double) { return 0.5; });
   RunContext context;
   test::LimitedLender lender(1 << 20);
   context.SetMemoryLender(&lender);

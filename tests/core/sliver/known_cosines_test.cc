@@ -102,7 +102,7 @@ TEST_F(KnownCosinesTest, AnotherBoundIsHeldAgainstThoseThatAreKnown) {
   EXPECT_LT(fewer.size(), more.size());
 }
 
-// A run that was cancelled has moved vertices nobody has told of.
+// A run that was cancelled has moved vertices without a notice.
 TEST_F(KnownCosinesTest, AfterARunThatWasNotEndedAllAreMeasured) {
   cosines_.EndRun(Begin(cosines_, 12));
   Begin(cosines_, 12);
