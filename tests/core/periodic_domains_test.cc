@@ -165,6 +165,30 @@ TEST_F(PeriodicDomainsTest, RandomCells) {
   EXPECT_GE(meshed, 40);
 }
 
+// A vertex that has no place any more has no image either: what goes on from there matches.
+TEST_F(PeriodicDomainsTest, GoesOnAfterItsBudgetHasEnded) {
+  int ended = 0;
+  for (int i = 0; i < 20; ++i) {
+    Input input = RandomCell();
+    const absl::StatusOr<Mesh> whole = input.Make();
+    for (uint64_t short_by = 1; whole.ok() && short_by <= 6; ++short_by) {
+      const std::unique_ptr<Mesher> mesher = input.Create();
+      MeshParameters little = input.parameters;
+      little.max_vertices = whole->vertex_count() - short_by;
+      RunContext context;
+      if (mesher->Refine(little, context).ok()) {
+        continue;
+      }
+      ++ended;
+      ASSERT_EQ(mesher->Refine(input.parameters, context), absl::OkStatus());
+      const absl::StatusOr<Mesh> mesh = mesher->Extract(1, context);
+      ASSERT_TRUE(mesh.ok()) << mesh.status();
+      EXPECT_EQ(Check(*mesh, input), absl::OkStatus()) << "cell " << i << ", short by " << short_by;
+    }
+  }
+  EXPECT_GE(ended, 40);
+}
+
 // The same bits on any number of threads, and with segments in any order and direction.
 TEST_F(PeriodicDomainsTest, OneMesh) {
   Input input = Square({0, 1}, {0.375, 0.625});
