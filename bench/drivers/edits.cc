@@ -16,6 +16,7 @@
 #include "CLI/Formatter.hpp"
 #include "absl/strings/str_cat.h"
 #include "bench/drivers/meter.h"
+#include "bench/drivers/places.h"
 #include "bench/drivers/results.h"
 #include "core/meshers/mesher.h"
 #include "nlohmann/json.hpp"
@@ -43,23 +44,6 @@ double Now() {
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
-
-double Median(std::vector<double> values) {
-  std::ranges::sort(values);
-  return values[values.size() / 2];
-}
-
-// Points of the inner part of the unit box, the same on every machine.
-class Places {
- public:
-  double Next() {
-    state_ = state_ * 6364136223846793005 + 1442695040888963407;
-    return 0.1 + 0.8 * static_cast<double>(state_ >> 11) * 0x1p-53;
-  }
-
- private:
-  uint64_t state_ = 1;
-};
 
 // The parts of edits that were measured, in seconds.
 struct Parts {
@@ -147,11 +131,11 @@ int Main(int argc, char** argv) {
                                  {"make_seconds", make_seconds},
                                  {"extract_seconds", Now() - extracting},
                                  {"first_seconds", parts.all.front()},
-                                 {"edit_seconds", Median(parts.all)},
+                                 {"edit_seconds", Quantile(parts.all, 0.5)},
                                  {"longest_seconds", *std::ranges::max_element(parts.all)},
-                                 {"add_seconds", Median(parts.add)},
-                                 {"refine_seconds", Median(parts.refine)},
-                                 {"update_seconds", Median(parts.update)},
+                                 {"add_seconds", Quantile(parts.add, 0.5)},
+                                 {"refine_seconds", Quantile(parts.refine, 0.5)},
+                                 {"update_seconds", Quantile(parts.update, 0.5)},
                                  {"fingerprint", absl::StrCat(absl::Hex(fingerprint, absl::kZeroPad16))}};
   std::cout << report << '\n';
   return 0;

@@ -161,5 +161,25 @@ class EditsTest(unittest.TestCase):
                 self.assertGreater(report["vertices"], 0, row["mesh"])
 
 
+class ServiceTest(unittest.TestCase):
+    def test_measures_small_meshes_and_edits(self):
+        with tempfile.TemporaryDirectory() as folder:
+            out = pathlib.Path(folder) / "service.json"
+            result = run(BENCH / "service", "--quick", "--at-most", 100, "--seconds", 0.5, "--bin", BIN, "--json", out)
+            self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
+            document = json.loads(out.read_text(encoding="utf-8"))
+        jobs = [row["report"] for row in document["rows"] if "jobs" in row["report"]]
+        edits = [row["report"] for row in document["rows"] if "edit_seconds" in row["report"]]
+        self.assertGreaterEqual(len(jobs), 5)
+        self.assertGreaterEqual(len(edits), 3)
+        for report in jobs:
+            self.assertGreater(report["jobs"], 0)
+            self.assertGreater(report["server_seconds"], 0)
+            self.assertLessEqual(report["median_seconds"], report["p99_seconds"])
+        for report in edits:
+            self.assertGreater(report["vertices"], 100)
+            self.assertGreaterEqual(report["edit_seconds"], report["update_seconds"])
+
+
 if __name__ == "__main__":
     unittest.main()
