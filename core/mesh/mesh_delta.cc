@@ -17,6 +17,8 @@ constexpr uint32_t kNoRow = std::numeric_limits<uint32_t>::max();
 constexpr size_t kRowsBetweenChecks = size_t{1} << 14;
 // Slots of a table for each of its rows, at least: most rows are then found in the first one or two.
 constexpr uint64_t kSlotsPerRow = 2;
+// Rows that are compared at once: most of them are the same.
+constexpr size_t kRowsOfBlock = 256;
 
 constexpr uint64_t Mixed(uint64_t hash, uint64_t value) {
   hash = (hash ^ value) * 0x9e37'79b9'7f4a'7c15;
@@ -24,35 +26,6 @@ constexpr uint64_t Mixed(uint64_t hash, uint64_t value) {
 }
 
 uint64_t SlotsFor(uint64_t rows) { return std::bit_ceil(kSlotsPerRow * std::max<uint64_t>(rows, 1)); }
-
-// The bits of an array, as one number.
-template <typename Values>
-uint64_t ExtendFingerprint(uint64_t hash, const Values& values) {
-  const size_t bytes = values.size() * sizeof(values[0]);
-  const char* data = reinterpret_cast<const char*>(values.data());
-  hash = Mixed(hash, bytes);
-  for (size_t at = 0; at < bytes; at += sizeof(uint64_t)) {
-    uint64_t word = 0;
-    std::memcpy(&word, data + at, std::min(sizeof(word), bytes - at));
-    hash = Mixed(hash, word);
-  }
-  return hash;
-}
-
-uint64_t FingerprintOf(const Mesh& mesh) {
-  uint64_t hash = ExtendFingerprint(static_cast<uint64_t>(mesh.dimension), mesh.points);
-  hash = ExtendFingerprint(hash, mesh.weights);
-  hash = ExtendFingerprint(hash, mesh.simplices);
-  hash = ExtendFingerprint(hash, mesh.input_vertex);
-  hash = ExtendFingerprint(hash, mesh.vertex_origins);
-  hash = ExtendFingerprint(hash, mesh.vertex_tags);
-  hash = ExtendFingerprint(hash, mesh.simplex_regions);
-  hash = ExtendFingerprint(hash, mesh.facets);
-  if (!mesh.ridges.empty()) {  // others have the fingerprints that earlier builds have written down
-    hash = ExtendFingerprint(hash, mesh.ridges);
-  }
-  return ExtendFingerprint(hash, mesh.moved_vertices);
-}
 
 // Finds rows of an array by their numbers.
 class RowTable {
@@ -141,18 +114,24 @@ absl::StatusOr<MovedRows> DiffMovedRows(std::span<const uint32_t> base, std::spa
 }
 
 template <typename T>
-bool IsSameRow(const T* a, const T* b, size_t width) {
-  return std::memcmp(a, b, width * sizeof(T)) == 0;  // to the bit: zeros have signs
+bool AreSame(const T* a, const T* b, size_t count) {
+  return std::memcmp(a, b, count * sizeof(T)) == 0;  // to the bit: zeros have signs
 }
 
 template <typename T>
 ChangedRows<T> DiffChangedRows(std::span<const T> base, std::span<const T> next, size_t width) {
   ChangedRows<T> rows{.rows = next.size() / width};
   const size_t common = std::min(base.size(), next.size()) / width;
-  for (size_t row = 0; row < common; ++row) {
-    if (!IsSameRow(&base[row * width], &next[row * width], width)) {
-      rows.changed.push_back(static_cast<uint32_t>(row));
-      rows.values.insert(rows.values.end(), &next[row * width], &next[row * width] + width);
+  for (size_t first = 0; first < common; first += kRowsOfBlock) {
+    const size_t end = std::min(first + kRowsOfBlock, common);
+    if (AreSame(&base[first * width], &next[first * width], (end - first) * width)) {
+      continue;
+    }
+    for (size_t row = first; row < end; ++row) {
+      if (!AreSame(&base[row * width], &next[row * width], width)) {
+        rows.changed.push_back(static_cast<uint32_t>(row));
+        rows.values.insert(rows.values.end(), &next[row * width], &next[row * width] + width);
+      }
     }
   }
   rows.values.insert(rows.values.end(), next.begin() + common * width, next.end());
@@ -199,87 +178,6 @@ ChangedRows<int32_t> DiffRegions(const Mesh& base, const Mesh& next, const HugeV
   return rows;
 }
 
-template <typename... Parts>
-absl::Status Contradiction(const Parts&... parts) {
-  return absl::InvalidArgumentError(absl::StrCat("the difference cannot be applied to this mesh: ", parts...));
-}
-
-// The array that the runs make. A base of another mesh has too few rows, or none that are needed.
-absl::StatusOr<HugeVector<uint32_t>> ApplyMovedRows(std::span<const uint32_t> base, const MovedRows& rows,
-                                                    size_t width) {
-  const uint64_t base_rows = base.size() / width;
-  HugeVector<uint32_t> next;
-  uint64_t taken = 0;  // of the new rows
-  for (const RowRun& run : rows.runs) {
-    if (run.begin > base_rows || run.kept > base_rows - run.begin || run.added > rows.added.size() / width - taken) {
-      return Contradiction("it keeps ", run.kept, " rows from row ", run.begin, " on, of ", base_rows);
-    }
-    next.insert(next.end(), base.begin() + run.begin * width, base.begin() + (run.begin + run.kept) * width);
-    const auto added = rows.added.begin() + taken * width;
-    next.insert(next.end(), added, added + run.added * width);
-    taken += run.added;
-  }
-  return taken * width == rows.added.size() ? absl::StatusOr<HugeVector<uint32_t>>(std::move(next))
-                                            : Contradiction("it has rows that no run takes");
-}
-
-// Puts the values of the rows that are listed, which are the first of `values`, into `array`.
-template <typename T>
-absl::Status PutChanged(const ChangedRows<T>& rows, size_t width, HugeVector<T>& array) {
-  if (rows.changed.size() > rows.values.size() / width) {
-    return Contradiction("it lists ", rows.changed.size(), " rows, and has ", rows.values.size() / width);
-  }
-  for (size_t i = 0; i < rows.changed.size(); ++i) {
-    if (rows.changed[i] >= array.size() / width) {
-      return Contradiction("it changes row ", rows.changed[i], " of ", array.size() / width);
-    }
-    std::copy_n(&rows.values[i * width], width, &array[rows.changed[i] * width]);
-  }
-  return absl::OkStatus();
-}
-
-template <typename T>
-absl::StatusOr<HugeVector<T>> ApplyChangedRows(std::span<const T> base, const ChangedRows<T>& rows, size_t width) {
-  if (rows.rows > kNoRow) {
-    return Contradiction("it makes ", rows.rows, " rows");
-  }
-  const uint64_t numbers = rows.rows * width;
-  HugeVector<T> next(base.begin(), base.begin() + std::min<uint64_t>(base.size() / width * width, numbers));
-  WELLSPACE_RETURN_IF_ERROR(PutChanged(rows, width, next));
-  next.insert(next.end(), rows.values.begin() + rows.changed.size() * width, rows.values.end());
-  if (next.size() != numbers) {
-    return Contradiction("it makes ", next.size() / width, " rows of ", rows.rows);
-  }
-  return next;
-}
-
-absl::StatusOr<HugeVector<int32_t>> ApplyRegions(const Mesh& base, const MeshDelta& delta) {
-  const ChangedRows<int32_t>& rows = delta.simplex_regions;
-  if (rows.rows == 0 || base.simplex_regions.empty()) {
-    return ApplyChangedRows<int32_t>({}, rows, 1);
-  }
-  if (base.simplex_regions.size() != base.simplex_count() || rows.rows != delta.simplices ||
-      rows.changed.size() > rows.values.size()) {
-    return Contradiction("it has regions of ", rows.rows, " of ", delta.simplices, " simplices");
-  }
-  HugeVector<int32_t> next(rows.rows);
-  ForEachKept(delta.kept_simplices.runs,
-              [&](uint64_t row, uint64_t base_row) { next[row] = base.simplex_regions[base_row]; });
-  WELLSPACE_RETURN_IF_ERROR(PutChanged(rows, 1, next));
-  std::span<const int32_t> added(rows.values);
-  added = added.subspan(rows.changed.size());
-  bool has_all = true;
-  ForEachAdded(delta.kept_simplices.runs, [&](uint64_t first, uint64_t end) {
-    has_all = has_all && end - first <= added.size();
-    if (has_all) {
-      std::copy_n(added.begin(), end - first, next.begin() + first);
-      added = added.subspan(end - first);
-    }
-  });
-  return has_all && added.empty() ? absl::StatusOr<HugeVector<int32_t>>(std::move(next))
-                                  : Contradiction("it has other regions than new simplices");
-}
-
 template <typename T>
 uint64_t BytesOf(const HugeVector<T>& values) {
   return values.size() * sizeof(T);
@@ -300,7 +198,7 @@ uint64_t MeshDelta::memory_bytes() const {
 
 uint64_t DeltaScratchBytes(uint64_t base_simplices) { return SlotsFor(base_simplices) * sizeof(uint32_t); }
 
-absl::StatusOr<MeshDelta> DiffMeshes(const Mesh& base, const Mesh& next, uint64_t max_bytes,
+absl::StatusOr<MeshDelta> DiffMeshes(const Mesh& base, const Mesh& next, const MovedRows* simplices, uint64_t max_bytes,
                                      const RunContext& context) {
   if (base.dimension != next.dimension || base.dimension < 1) {
     return absl::InvalidArgumentError(
@@ -319,15 +217,18 @@ absl::StatusOr<MeshDelta> DiffMeshes(const Mesh& base, const Mesh& next, uint64_
   delta.base_simplices = base.simplex_count();
   delta.vertices = next.vertex_count();
   delta.simplices = next.simplex_count();
-  delta.fingerprint = FingerprintOf(next);
   delta.points = DiffChangedRows<double>(base.points, next.points, dimension);
   delta.weights = DiffChangedRows<double>(base.weights, next.weights, 1);
   delta.input_vertex = DiffChangedRows<uint32_t>(base.input_vertex, next.input_vertex, 1);
   delta.vertex_origins = DiffChangedRows<uint32_t>(base.vertex_origins, next.vertex_origins, 1);
   delta.vertex_tags = DiffChangedRows<int32_t>(base.vertex_tags, next.vertex_tags, 1);
   WELLSPACE_RETURN_IF_ERROR(context.Check());
-  WELLSPACE_ASSIGN_OR_RETURN(delta.kept_simplices,
-                             DiffMovedRows(base.simplices, next.simplices, dimension + 1, max_bytes, context));
+  if (simplices != nullptr) {
+    delta.kept_simplices = *simplices;
+  } else {
+    WELLSPACE_ASSIGN_OR_RETURN(delta.kept_simplices,
+                               DiffMovedRows(base.simplices, next.simplices, dimension + 1, max_bytes, context));
+  }
   delta.simplex_regions = DiffRegions(base, next, delta.kept_simplices.runs);
   WELLSPACE_ASSIGN_OR_RETURN(delta.kept_facets, DiffMovedRows(base.facets, next.facets, dimension, max_bytes, context));
   WELLSPACE_ASSIGN_OR_RETURN(delta.kept_ridges, DiffMovedRows(base.ridges, next.ridges, 2, max_bytes, context));
@@ -338,41 +239,6 @@ absl::StatusOr<MeshDelta> DiffMeshes(const Mesh& base, const Mesh& next, uint64_
   delta.regions = next.regions;
   delta.statistics = next.statistics;
   return delta.memory_bytes() <= max_bytes ? absl::StatusOr<MeshDelta>(std::move(delta)) : TooLarge(max_bytes);
-}
-
-absl::StatusOr<Mesh> ApplyDelta(const Mesh& base, const MeshDelta& delta) {
-  if (delta.dimension != base.dimension || base.dimension < 1 || delta.base_vertices != base.vertex_count() ||
-      delta.base_simplices != base.simplex_count()) {
-    return Contradiction("it is of one with ", delta.base_vertices, " vertices and ", delta.base_simplices,
-                         " simplices in ", delta.dimension, "-D");
-  }
-  const size_t dimension = base.dimension;
-  Mesh next;
-  next.dimension = base.dimension;
-  next.domain_low = delta.domain_low;
-  next.domain_high = delta.domain_high;
-  next.moved_vertices = delta.moved_vertices;
-  next.boundary = delta.boundary;
-  next.regions = delta.regions;
-  next.statistics = delta.statistics;
-  WELLSPACE_ASSIGN_OR_RETURN(next.points, ApplyChangedRows<double>(base.points, delta.points, dimension));
-  WELLSPACE_ASSIGN_OR_RETURN(next.weights, ApplyChangedRows<double>(base.weights, delta.weights, 1));
-  WELLSPACE_ASSIGN_OR_RETURN(next.input_vertex, ApplyChangedRows<uint32_t>(base.input_vertex, delta.input_vertex, 1));
-  WELLSPACE_ASSIGN_OR_RETURN(next.vertex_origins,
-                             ApplyChangedRows<uint32_t>(base.vertex_origins, delta.vertex_origins, 1));
-  WELLSPACE_ASSIGN_OR_RETURN(next.vertex_tags, ApplyChangedRows<int32_t>(base.vertex_tags, delta.vertex_tags, 1));
-  WELLSPACE_ASSIGN_OR_RETURN(next.simplices, ApplyMovedRows(base.simplices, delta.kept_simplices, dimension + 1));
-  if (next.simplex_count() != delta.simplices || next.vertex_count() != delta.vertices) {
-    return Contradiction("it makes ", next.vertex_count(), " of ", delta.vertices, " vertices and ",
-                         next.simplex_count(), " of ", delta.simplices, " simplices");
-  }
-  WELLSPACE_ASSIGN_OR_RETURN(next.simplex_regions, ApplyRegions(base, delta));
-  WELLSPACE_ASSIGN_OR_RETURN(next.facets, ApplyMovedRows(base.facets, delta.kept_facets, dimension));
-  WELLSPACE_ASSIGN_OR_RETURN(next.ridges, ApplyMovedRows(base.ridges, delta.kept_ridges, 2));
-  if (FingerprintOf(next) != delta.fingerprint) {
-    return Contradiction("the mesh that it makes is not the one that it is of");
-  }
-  return next;
 }
 
 }  // namespace wellspace::core

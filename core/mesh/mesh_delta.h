@@ -45,7 +45,6 @@ struct MeshDelta {
   // Counts of the mesh that it makes.
   uint64_t vertices = 0;
   uint64_t simplices = 0;
-  uint64_t fingerprint = 0;  // of all its arrays
 
   ChangedRows<double> points{};
   ChangedRows<double> weights{};
@@ -72,25 +71,20 @@ struct MeshDelta {
 };
 
 // The changes that make `base` the mesh `next`. It is small where `next` is an update of `base`, and right for any two
-// meshes. One that takes more than `max_bytes` is not made.
+// meshes. One that takes more than `max_bytes` is not made. `simplices`, if not null, are the runs that make the
+// simplices of `next`, as Mesher::Update notes them: none has to be looked for then.
 //
 // REQUIRES:   both are as Mesher makes them, or with empty arrays of the boundary.
-// Guarantees: ApplyDelta(base, it) is `next` to the bit, in its order.
+// Guarantees: the arrays that it makes are those of `next` to the bit, in their order.
 // Complexity: expected O(n) for n rows of both, and DeltaScratchBytes of memory beside the result.
 // Errors:     INVALID_ARGUMENT: meshes of two dimensions; RESOURCE_EXHAUSTED: max_bytes, more rows than 32 bits
 //             can number; CANCELLED, DEADLINE_EXCEEDED.
 // Threads:    thread-safe.
-absl::StatusOr<MeshDelta> DiffMeshes(const Mesh& base, const Mesh& next, uint64_t max_bytes, const RunContext& context);
+absl::StatusOr<MeshDelta> DiffMeshes(const Mesh& base, const Mesh& next, const MovedRows* simplices, uint64_t max_bytes,
+                                     const RunContext& context);
 
-// The memory of DiffMeshes beside its result. Unit: bytes.
+// The memory of DiffMeshes beside its result, where it looks for simplices. Unit: bytes.
 uint64_t DeltaScratchBytes(uint64_t base_simplices);
-
-// The mesh that `delta` makes of `base`.
-//
-// Complexity: O(n) for n rows of the new mesh.
-// Errors:     INVALID_ARGUMENT: it is the difference from another mesh, or contradicts itself.
-// Threads:    thread-safe.
-absl::StatusOr<Mesh> ApplyDelta(const Mesh& base, const MeshDelta& delta);
 
 }  // namespace wellspace::core
 

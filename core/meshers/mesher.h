@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -14,6 +15,8 @@
 #include "core/mesh/mesh.h"
 
 namespace wellspace::core {
+
+struct MovedRows;  // core/mesh/mesh_delta.h
 
 // A mesh in the making and after: the query structure of [HT08] with its refinement. Vertices can be added to a refined
 // mesh, and it be refined again, at the cost of the change.
@@ -144,8 +147,12 @@ class Mesher {
   // Complexity: O(1) for each vertex added or moved, a move of the rows behind the first that changes, and a look at
   //             the facets of the box. One pass over the simplices besides, where slivers are not repaired: the first
   //             time, and if the worst simplex has gone. With pump_weights, and in a domain, as Extract.
+  // `simplices`, if not null, becomes the runs of rows that make the simplices of the mesh before those of this one;
+  // nothing where the mesh was made anew.
+  //
   // Errors:     as Extract; INVALID_ARGUMENT for another mesh. On an error `mesh` is unchanged.
-  virtual absl::Status Update(Mesh& mesh, int threads, RunContext& context) = 0;
+  virtual absl::Status Update(Mesh& mesh, int threads, RunContext& context, std::optional<MovedRows>* simplices) = 0;
+  absl::Status Update(Mesh& mesh, int threads, RunContext& context) { return Update(mesh, threads, context, nullptr); }
 
   // The size that the mesh would have with these parameters, from the tree as Create left it.
   //

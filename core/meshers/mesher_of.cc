@@ -36,6 +36,18 @@ const PartNames* NamesOf(const Input& input) {
                                      : nullptr;
 }
 
+// The changes of an array of `rows` as the runs that make the array after them.
+MovedRows RunsOf(const SimplexChanges& changes, uint64_t rows) {
+  MovedRows moved{.added = changes.added};
+  uint64_t begin = 0;
+  for (const RowEdit& edit : changes.edits) {
+    moved.runs.push_back({.begin = begin, .kept = edit.at - begin, .added = edit.added});
+    begin = edit.at + edit.dropped;
+  }
+  moved.runs.push_back({.begin = begin, .kept = rows - begin, .added = 0});
+  return moved;
+}
+
 }  // namespace
 
 template <typename Domain>
@@ -220,13 +232,20 @@ absl::StatusOr<Mesh> MesherOf<Domain>::Extract(int threads, RunContext& context)
 }
 
 template <typename Domain>
-absl::Status MesherOf<Domain>::Update(Mesh& mesh, int threads, RunContext& context) {
+absl::Status MesherOf<Domain>::Update(Mesh& mesh, int threads, RunContext& context,
+                                      std::optional<MovedRows>* simplices) {
   WELLSPACE_RETURN_IF_ERROR(CheckRefined(is_refined_, threads));
   WELLSPACE_RETURN_IF_ERROR(CheckLastMesh(mesh, D, figures_.extracted_vertices, figures_.extracted_simplices));
   WELLSPACE_ASSIGN_OR_RETURN(const std::optional<Changes> changes, FindChanges(mesh, threads, context));
+  if (simplices != nullptr) {
+    simplices->reset();
+  }
   if (!changes.has_value()) {
     WELLSPACE_ASSIGN_OR_RETURN(mesh, Extract(threads, context));
     return absl::OkStatus();
+  }
+  if (simplices != nullptr) {
+    *simplices = RunsOf(changes->simplices, mesh.simplex_count());
   }
   // From here on nothing fails.
   const uint64_t old_vertices = mesh.vertex_count();

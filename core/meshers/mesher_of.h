@@ -19,6 +19,7 @@
 #include "core/input/scaled_samples.h"
 #include "core/input/sorted_cloud.h"
 #include "core/input/vertex_numbering.h"
+#include "core/mesh/mesh_delta.h"
 #include "core/meshers/feasibility.h"
 #include "core/meshers/mesher.h"
 #include "core/meshers/mesher_figures.h"
@@ -57,7 +58,7 @@ class MesherOf : public Mesher {
   absl::StatusOr<std::vector<double>> NearestNeighborDistances(std::span<const uint32_t> vertices) const final;
   absl::StatusOr<std::vector<Cell>> ClippedCells(std::span<const uint32_t> vertices, double beta) const final;
   absl::StatusOr<Mesh> Extract(int threads, RunContext& context) final;
-  absl::Status Update(Mesh& mesh, int threads, RunContext& context) final;
+  absl::Status Update(Mesh& mesh, int threads, RunContext& context, std::optional<MovedRows>* simplices) final;
   absl::StatusOr<MeshEstimate> Estimate(const MeshParameters& parameters, const RunContext& context) const final {
     return EstimateFor(parameters, /*is_to_reserve=*/false, context);
   }

@@ -58,9 +58,15 @@ absl::Status BringBack(const MesherFactory& create_mesher, const SessionInputs& 
   return absl::OkStatus();
 }
 
+// A mesh, and the runs that make its simplices of those of the last one; nothing if these are not known.
+struct Updated {
+  core::Mesh mesh;
+  std::optional<core::MovedRows> simplices{};
+};
+
 // `*has_changed`: the mesher may be another than before, on an error too.
-absl::StatusOr<core::Mesh> MeshAgain(const SessionInputs& inputs, const core::MeshParameters& parameters,
-                                     core::RunContext& context, SessionWork& work, bool* has_changed) {
+absl::StatusOr<Updated> MeshAgain(const SessionInputs& inputs, const core::MeshParameters& parameters,
+                                  core::RunContext& context, SessionWork& work, bool* has_changed) {
   context.EnterPhase(core::Phase::kTree);
   WELLSPACE_RETURN_IF_ERROR(work.mesher->CheckFeasible(parameters));
   *has_changed = true;
@@ -74,13 +80,14 @@ absl::StatusOr<core::Mesh> MeshAgain(const SessionInputs& inputs, const core::Me
   WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(work.mesher->memory_bytes() + work.mesh->loaded_bytes()));
   // Downloads may still read the last mesh: the next one is made of a copy.
   WELLSPACE_ASSIGN_OR_RETURN(core::Mesh mesh, work.mesh->Load(context));
-  WELLSPACE_RETURN_IF_ERROR(work.mesher->Update(mesh, parameters.threads, context));
-  return mesh;
+  Updated updated{.mesh = std::move(mesh)};
+  WELLSPACE_RETURN_IF_ERROR(work.mesher->Update(updated.mesh, parameters.threads, context, &updated.simplices));
+  return updated;
 }
 
 // The difference from the last mesh to `next`, if clients may want it, and it is small. Null otherwise, and where
 // memory does not allow it: they download the mesh then.
-std::shared_ptr<DeltaSnapshot> MakeDelta(const Session& session, const SessionInputs& inputs, const core::Mesh& next,
+std::shared_ptr<DeltaSnapshot> MakeDelta(const Session& session, const SessionInputs& inputs, const Updated& next,
                                          const core::RunContext& context, const SessionWork& work) {
   const MeshSnapshot& last = *work.mesh;
   if (!session.meshes().deltas().IsWanted(last.revision())) {
@@ -89,11 +96,14 @@ std::shared_ptr<DeltaSnapshot> MakeDelta(const Session& session, const SessionIn
   std::shared_ptr<DeltaSnapshot> made;
   const absl::Status status = RunGuarded([&]() -> absl::Status {
     const uint64_t most = last.loaded_bytes() / 2;  // beyond it, the whole mesh is hardly more
-    WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(work.mesher->memory_bytes() + 2 * last.loaded_bytes() +
-                                                  core::DeltaScratchBytes(last.record().simplices()) + most));
+    const core::MovedRows* const simplices = next.simplices.has_value() ? &*next.simplices : nullptr;
+    const uint64_t scratch = simplices != nullptr ? 0 : core::DeltaScratchBytes(last.record().simplices());
+    WELLSPACE_RETURN_IF_ERROR(
+        context.AllowMemory(work.mesher->memory_bytes() + 2 * last.loaded_bytes() + scratch + most));
     WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<const core::Mesh> base, last.Whole(context));
-    WELLSPACE_ASSIGN_OR_RETURN(const core::MeshDelta delta, core::DiffMeshes(*base, next, most, context));
-    made = std::make_shared<DeltaSnapshot>(last.revision(), NextRevision(*inputs.state), delta, next);
+    WELLSPACE_ASSIGN_OR_RETURN(const core::MeshDelta delta,
+                               core::DiffMeshes(*base, next.mesh, simplices, most, context));
+    made = std::make_shared<DeltaSnapshot>(last.revision(), NextRevision(*inputs.state), delta, next.mesh);
     return absl::OkStatus();
   });
   return status.ok() ? made : nullptr;
@@ -110,22 +120,23 @@ struct Made {
 absl::StatusOr<Made> MakeMesh(const MesherFactory& create_mesher, const Session& session, const SessionInputs& inputs,
                               const core::MeshParameters& parameters, bool is_first, Job& job, SessionWork& work) {
   bool has_changed = is_first;
-  const auto make = [&]() -> absl::StatusOr<core::Mesh> {
+  const auto make = [&]() -> absl::StatusOr<Updated> {
     if (is_first) {
       work.mesher = nullptr;  // of a restart
-      return MeshFirst(create_mesher, inputs, parameters, job.context(), work);
+      WELLSPACE_ASSIGN_OR_RETURN(core::Mesh mesh, MeshFirst(create_mesher, inputs, parameters, job.context(), work));
+      return Updated{.mesh = std::move(mesh)};
     }
     WELLSPACE_RETURN_IF_ERROR(BringBack(create_mesher, inputs, job, work));
     return MeshAgain(inputs, parameters, job.context(), work, &has_changed);
   };
   Made made;
   const absl::Status status = RunGuarded([&] {
-    WELLSPACE_ASSIGN_OR_RETURN(core::Mesh mesh, make());
+    WELLSPACE_ASSIGN_OR_RETURN(Updated next, make());
     has_changed = true;
     if (!is_first) {
-      made.delta = MakeDelta(session, inputs, mesh, job.context(), work);
+      made.delta = MakeDelta(session, inputs, next, job.context(), work);
     }
-    WELLSPACE_ASSIGN_OR_RETURN(made.mesh, session.KeepMesh(std::move(mesh), job.context()));
+    WELLSPACE_ASSIGN_OR_RETURN(made.mesh, session.KeepMesh(std::move(next.mesh), job.context()));
     return absl::OkStatus();
   });
   if (status.ok()) {

@@ -10,11 +10,14 @@ namespace wellspace::server {
 namespace {
 
 constexpr size_t kCopyBlock = size_t{1} << 20;  // numbers copied between two looks at the context
+// Copies have room for this part more, so that a small update does not move them again. Pages that are never touched
+// take no memory.
+constexpr size_t kSpareShare = 64;
 
 template <typename T>
 absl::StatusOr<core::HugeVector<T>> Copy(const core::HugeVector<T>& values, const core::RunContext& context) {
   core::HugeVector<T> copy;
-  copy.reserve(values.size());
+  copy.reserve(values.size() + values.size() / kSpareShare);
   for (size_t begin = 0; begin < values.size(); begin += kCopyBlock) {
     WELLSPACE_RETURN_IF_ERROR(context.Check());
     const T* first = values.data() + begin;

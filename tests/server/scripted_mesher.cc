@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <memory>
+#include <optional>
 #include <span>
 #include <thread>
 #include <utility>
@@ -49,7 +50,8 @@ class FakeSessionMesher final : public core::Mesher {
     context.EnterPhase(core::Phase::kDone);
     return mesh_ != nullptr ? *mesh_ : MakeFakeMesh(parameters_, points_);
   }
-  absl::Status Update(core::Mesh& mesh, int threads, core::RunContext& context) override {
+  absl::Status Update(core::Mesh& mesh, int threads, core::RunContext& context,
+                      std::optional<core::MovedRows>* /*simplices*/) override {
     WELLSPACE_ASSIGN_OR_RETURN(mesh, Extract(threads, context));
     return absl::OkStatus();
   }

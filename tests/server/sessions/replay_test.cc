@@ -158,9 +158,10 @@ class BreakableMesher final : public core::Mesher {
     return Broken(script_, Call::kExtract, context,
                   [&](core::RunContext& inner) { return mesher_->Extract(threads, inner); });
   }
-  absl::Status Update(core::Mesh& mesh, int threads, core::RunContext& context) override {
+  absl::Status Update(core::Mesh& mesh, int threads, core::RunContext& context,
+                      std::optional<core::MovedRows>* simplices) override {
     return Broken(script_, Call::kUpdate, context,
-                  [&](core::RunContext& inner) { return mesher_->Update(mesh, threads, inner); });
+                  [&](core::RunContext& inner) { return mesher_->Update(mesh, threads, inner, simplices); });
   }
   absl::StatusOr<core::MeshEstimate> Estimate(const core::MeshParameters& parameters,
                                               const core::RunContext& context) const override {

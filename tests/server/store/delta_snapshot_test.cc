@@ -37,7 +37,7 @@ class DeltaSnapshotTest : public ::testing::Test {
     next_.vertex_origins.assign(next_.vertex_count(), core::kSteinerOrigin);
     next_.boundary = {{.tag = 1, .name = "one", .facets = 0}};
     next_.regions = {{.id = 1, .name = "domain"}};
-    delta_ = core::DiffMeshes(base_, next_, uint64_t{1} << 40, core::RunContext()).value();
+    delta_ = core::DiffMeshes(base_, next_, nullptr, uint64_t{1} << 40, core::RunContext()).value();
   }
 
   core::Mesh base_;
