@@ -45,9 +45,13 @@ Backend::Backend(const ServiceOptions& options, const Authenticator& authenticat
       session_log_(std::move(session_log)),
       request_ids_(drive.clock.since_boot, session_log_->records()),
       memory_(options_.max_memory_bytes),
-      sessions_(
-          options_, memory_, drive.clock, *session_log_, drive.make_session_name,
-          [this](const std::string& tenant, const std::string& name) { return other_owners_.Find(tenant, name); }),
+      sessions_(options_, memory_, drive.clock, *session_log_, drive.make_session_name,
+                session_log_->records().is_shared()
+                    ? std::optional(SessionRegistry::Others{
+                          .find = [this](const std::string& tenant,
+                                         const std::string& name) { return other_owners_.Find(tenant, name); },
+                          .list_offered = [this] { return other_owners_.ListOffered(); }})
+                    : std::nullopt),
       other_owners_(
           session_log_->records(),
           [this](const std::vector<StoredSession>& taken, OtherOwners::From from) {

@@ -53,8 +53,26 @@ absl::Status OtherOwners::Find(const std::string& tenant, const std::string& nam
   if (!thread_.has_value()) {
     return NoSuchSession(name);
   }
+  return Ask(name, [this, tenant, name] { return LookFor(tenant, name); });
+}
+
+absl::StatusOr<std::set<std::string>> OtherOwners::ListOffered() {
+  if (!thread_.has_value()) {
+    return std::set<std::string>();
+  }
+  const auto offered = std::make_shared<std::set<std::string>>();  // the thread may be late
+  WELLSPACE_RETURN_IF_ERROR(Ask("what is offered", [this, offered] {
+    const Turn turn(begun_at_);
+    WELLSPACE_ASSIGN_OR_RETURN(const std::vector<std::string> names, records_.ListOffered());
+    offered->insert(names.begin(), names.end());
+    return absl::OkStatus();
+  }));
+  return *offered;
+}
+
+absl::Status OtherOwners::Ask(const std::string& what, const std::function<absl::Status()>& ask) {
   if (IsLate()) {
-    return Unknown(name);
+    return Unknown(what);
   }
   struct Question {
     std::promise<absl::Status> found;
@@ -62,14 +80,14 @@ absl::Status OtherOwners::Find(const std::string& tenant, const std::string& nam
   };
   const auto question = std::make_shared<Question>();
   std::future<absl::Status> answer = question->found.get_future();
-  thread_->Post([this, tenant, name, question] {
+  thread_->Post([ask, question] {
     if (!question->is_given_up) {
-      question->found.set_value(RunGuarded([&] { return LookFor(tenant, name); }));
+      question->found.set_value(RunGuarded(ask));
     }
   });
   if (answer.wait_for(absl::ToChronoMilliseconds(kMostWait)) != std::future_status::ready) {
     question->is_given_up = true;
-    return Unknown(name);
+    return Unknown(what);
   }
   return answer.get();
 }

@@ -6,11 +6,13 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "absl/time/time.h"
 #include "server/jobs/background.h"
 #include "server/store/records.h"
@@ -54,10 +56,11 @@ class OtherOwners {
     }
   }
 
-  // As SessionRegistry::FindElsewhere. A session that is this process's, and not in its registry, is taken in again.
+  // As SessionRegistry::Others. A session that is this process's, and not in its registry, is taken in again.
   //
   // Errors:     SESSION_NOT_FOUND, SESSION_ELSEWHERE; STORE_FAILED: it is not known now.
   absl::Status Find(const std::string& tenant, const std::string& name);
+  absl::StatusOr<std::set<std::string>> ListOffered();
 
  private:
   // The following are of thread_.
@@ -69,6 +72,10 @@ class OtherOwners {
   void TakeAll(std::vector<StoredSession> taken, From from);
   // A session that is this process's, and not here.
   absl::Status TakeOne(const std::string& name);
+  // Has thread_ call `ask`, and waits for the answer, but no longer than kMostWait; `what` is asked about.
+  //
+  // Errors:     STORE_FAILED: there is none now.
+  absl::Status Ask(const std::string& what, const std::function<absl::Status()>& ask);
   // Whether what thread_ does takes longer than calls may wait.
   bool IsLate() const;
 

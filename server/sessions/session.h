@@ -317,8 +317,6 @@ class Session {
   // Another server, at `address`, has taken the session over for its operation. Those who watch it are told. Returns
   // the job that the caller is to cancel; null: there is none.
   std::shared_ptr<Job> GiveAway(const std::string& address);
-  // `status`, or, if a file was found damaged which another server may have removed, SESSION_ELSEWHERE.
-  absl::Status ErrorOfFile(const absl::Status& status) const;
 
   // The inputs of the work that has made the session busy.
   SessionInputs inputs() const;

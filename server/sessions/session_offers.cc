@@ -71,10 +71,4 @@ std::shared_ptr<Job> Session::GiveAway(const std::string& address) {
   return waiting->job();
 }
 
-absl::Status Session::ErrorOfFile(const absl::Status& status) const {
-  absl::MutexLock lock(&mutex_);
-  const bool may_be_removed = occupancy_.is_offered || occupancy_.is_elsewhere;
-  return absl::IsDataLoss(status) && may_be_removed ? Elsewhere(name(), occupancy_.owner_address) : status;
-}
-
 }  // namespace wellspace::server

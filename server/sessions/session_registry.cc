@@ -24,13 +24,13 @@ std::string UnguessableSessionName() {
 }
 
 SessionRegistry::SessionRegistry(const ServiceOptions& options, MemoryBudget& memory, Clock clock, SessionLog& log,
-                                 std::function<std::string()> make_name, FindElsewhere find_elsewhere)
+                                 std::function<std::string()> make_name, std::optional<Others> others)
     : options_(options),
       memory_(memory),
       clock_(std::move(clock)),
       log_(log),
       make_name_(std::move(make_name)),
-      find_elsewhere_(std::move(find_elsewhere)) {}
+      others_(std::move(others)) {}
 
 absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Create(NewSession settings,
                                                                  const AnswerTo<v1::Session>& answer) {
@@ -98,11 +98,17 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Restore(const StoredSe
     std::lock_guard lock(mutex_);
     points = tenants_[stored.state.tenant()].points;
   }
-  WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Session> session,
-                             Session::Restore(stored, options_, memory_, clock_, std::move(points), log_));
+  absl::StatusOr<std::shared_ptr<Session>> session =
+      Session::Restore(stored, options_, memory_, clock_, std::move(points), log_);
   std::lock_guard lock(mutex_);
-  last_create_time_ = std::max(last_create_time_, session->create_time());
-  Publish(session);
+  if (!session.ok()) {
+    unrestored_[stored.state.name()] = {stored.state.tenant(), std::string(session.status().message())};
+    DropIfEmpty(stored.state.tenant());
+    return session;
+  }
+  unrestored_.erase(stored.state.name());
+  last_create_time_ = std::max(last_create_time_, (*session)->create_time());
+  Publish(*session);
   return session;
 }
 
@@ -127,15 +133,40 @@ std::shared_ptr<Session> SessionRegistry::FindHere(const std::string& name) cons
 absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Find(const std::string& tenant, const std::string& name) {
   WELLSPACE_RETURN_IF_ERROR(log_.records().CheckOwnership());
   std::shared_ptr<Session> session = FindHere(name);
-  if (find_elsewhere_ != nullptr && (session == nullptr || session->IsElsewhere() || session->IsOffered())) {
-    WELLSPACE_RETURN_IF_ERROR(find_elsewhere_(tenant, name));
+  if (others_.has_value() && (session == nullptr || session->IsElsewhere() || session->IsOffered())) {
+    WELLSPACE_RETURN_IF_ERROR(others_->find(tenant, name));
     session = FindHere(name);
+  }
+  if (session == nullptr) {
+    WELLSPACE_RETURN_IF_ERROR(FindUnrestored(tenant, name));
   }
   const bool is_own = session != nullptr && session->tenant() == tenant;
   if (is_own && session->IsElsewhere()) {
     return Elsewhere(name);
   }
   return is_own && session->Renew() ? absl::StatusOr<std::shared_ptr<Session>>(session) : NoSuchSession(name);
+}
+
+absl::Status SessionRegistry::FindUnrestored(const std::string& tenant, const std::string& name) const {
+  std::lock_guard lock(mutex_);
+  const auto found = unrestored_.find(name);
+  return found == unrestored_.end() || found->second.tenant != tenant
+             ? absl::OkStatus()
+             : MakeError(v1::ERROR_REASON_FILE_DAMAGED,
+                         absl::StrCat(name, " is stored, and this server cannot restore it: ", found->second.message));
+}
+
+absl::Status SessionRegistry::ErrorOfFile(const Session& session, const absl::Status& status) const {
+  if (!absl::IsDataLoss(status)) {
+    return status;
+  }
+  if (session.IsElsewhere()) {
+    return Elsewhere(session.name());
+  }
+  if (others_.has_value() && session.IsOffered()) {
+    WELLSPACE_RETURN_IF_ERROR(others_->find(session.tenant(), session.name()));
+  }
+  return status;
 }
 
 std::vector<std::shared_ptr<Session>> SessionRegistry::List(const std::string& tenant, absl::Time after, size_t count,
@@ -149,18 +180,34 @@ std::vector<std::shared_ptr<Session>> SessionRegistry::List(const std::string& t
                      [](const auto& session) { return session.second; });
     }
   }
+  LeaveOutTaken(sessions);
   std::vector<std::shared_ptr<Session>> listed;
   for (const std::shared_ptr<Session>& session : sessions) {
     if (listed.size() < count && HasLabels(*session->state(), labels) && !session->IsExpired() &&
-        !session->IsElsewhere() && !IsTaken(*session)) {
+        !session->IsElsewhere()) {
       listed.push_back(session);
     }
   }
   return listed;
 }
 
-bool SessionRegistry::IsTaken(const Session& session) const {
-  return find_elsewhere_ != nullptr && session.IsOffered() && !find_elsewhere_(session.tenant(), session.name()).ok();
+void SessionRegistry::LeaveOutTaken(std::vector<std::shared_ptr<Session>>& sessions) const {
+  const auto is_offered = [](const std::shared_ptr<Session>& session) { return session->IsOffered(); };
+  if (!others_.has_value() || std::ranges::none_of(sessions, is_offered)) {
+    return;
+  }
+  const absl::StatusOr<std::set<std::string>> offered = others_->list_offered();
+  if (!offered.ok()) {
+    return;
+  }
+  std::erase_if(sessions, [&](const std::shared_ptr<Session>& session) {
+    if (!is_offered(session) || offered->contains(session->name())) {
+      return false;
+    }
+    // It was taken, or its offer begins or ends just now.
+    const absl::Status found = others_->find(session->tenant(), session->name());
+    return absl::IsNotFound(found) || session->IsElsewhere() || IsElsewhereError(found);
+  });
 }
 
 std::vector<std::shared_ptr<Session>> SessionRegistry::All() const {

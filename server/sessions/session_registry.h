@@ -7,6 +7,8 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
+#include <set>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -39,16 +41,20 @@ std::string UnguessableSessionName();
 //             used again, and cannot be guessed.
 class SessionRegistry {
  public:
-  // Asked, without a lock, for a session that is not here, or may be taken over by another process. OK: it is here; it
-  // may have been taken in meanwhile (Restore). Errors: those of Find.
-  using FindElsewhere = std::function<absl::Status(const std::string& tenant, const std::string& name)>;
+  // Questions about sessions that other processes may have. They are asked without a lock, and answered soon.
+  struct Others {
+    // OK: the session is this process's; it may have been taken in meanwhile (Restore). Errors: those of Find.
+    std::function<absl::Status(const std::string& tenant, const std::string& name)> find;
+    // The names of the sessions that this process offers, and still owns. Errors: STORE_FAILED.
+    std::function<absl::StatusOr<std::set<std::string>>()> list_offered;
+  };
 
   // REQUIRES:   `options`, `memory` and `log` outlive this and all sessions.
-  // `make_name` makes the names of new sessions, no two the same; another one is for tests. `find_elsewhere`: null,
-  // where no other process shares the log.
+  // `make_name` makes the names of new sessions, no two the same; another one is for tests. `others`: none, where no
+  // other process shares the log.
   SessionRegistry(const ServiceOptions& options, MemoryBudget& memory, Clock clock, SessionLog& log,
                   std::function<std::string()> make_name = UnguessableSessionName,
-                  FindElsewhere find_elsewhere = nullptr);
+                  std::optional<Others> others = std::nullopt);
 
   // Makes a session without points, and has it written down.
   //
@@ -58,13 +64,14 @@ class SessionRegistry {
   // Takes a session in that another process has had, or this one before it was restarted, whatever the limits are now.
   // One of its name that was here is closed: it is another server's, or was before this.
   //
-  // Errors:     those of Session::Restore.
+  // Errors:     those of Session::Restore, which Find tells of, too, until it can be restored.
   absl::StatusOr<std::shared_ptr<Session>> Restore(const StoredSession& stored);
 
   // The session `name` of `tenant`, its lease renewed.
   //
   // Errors:     SESSION_NOT_FOUND: there is none, it has expired, or it is another tenant's. SESSION_ELSEWHERE: another
-  //             server has it. STORE_FAILED: it cannot be found out now who has it.
+  //             server has it. STORE_FAILED: it cannot be found out now who has it. FILE_DAMAGED: it is this server's,
+  //             which could not restore it.
   absl::StatusOr<std::shared_ptr<Session>> Find(const std::string& tenant, const std::string& name);
 
   // The session `name`, whosever it is, as it is. Null: it is not here.
@@ -74,6 +81,10 @@ class SessionRegistry {
   // have all of `labels`. No two sessions were created at the same time.
   std::vector<std::shared_ptr<Session>> List(const std::string& tenant, absl::Time after, size_t count,
                                              const std::map<std::string, std::string>& labels);
+
+  // An error of a call on `session`, whose file another process may have removed that has taken the session over:
+  // SESSION_ELSEWHERE then, and STORE_FAILED where that cannot be found out now. Else `status`, as it is.
+  absl::Status ErrorOfFile(const Session& session, const absl::Status& status) const;
 
   // All sessions, of all tenants, in no order.
   std::vector<std::shared_ptr<Session>> All() const;
@@ -107,8 +118,11 @@ class SessionRegistry {
   // Errors:     QUOTA_EXCEEDED, TOO_MANY_SESSIONS.
   absl::Status TakePlace(const std::string& tenant, std::shared_ptr<TenantPoints>* points, absl::Time* create_time);
 
-  // Whether another process has taken a session over that is offered to it, or that is not known now.
-  bool IsTaken(const Session& session) const;
+  // Takes those out that another process has taken over, of those that are offered. If the store does not say, they are
+  // taken for this process's.
+  void LeaveOutTaken(std::vector<std::shared_ptr<Session>>& sessions) const;
+  // The error of Restore for the session `name`, if there was one.
+  absl::Status FindUnrestored(const std::string& tenant, const std::string& name) const;
 
   // The following want mutex_ to be held.
   void Publish(const std::shared_ptr<Session>& session);
@@ -120,12 +134,18 @@ class SessionRegistry {
   const Clock clock_;
   SessionLog& log_;
   const std::function<std::string()> make_name_;
-  const FindElsewhere find_elsewhere_;  // may be null
+  const std::optional<Others> others_;
   mutable std::mutex mutex_;
   // Guarded by mutex_.
   std::unordered_map<std::string, std::shared_ptr<Session>> by_name_;
   std::map<std::string, Tenant> tenants_;  // those that have, or have had, sessions
-  size_t pending_ = 0;                     // of all tenants
+  // Sessions that could not be restored, by name.
+  struct Unrestored {
+    std::string tenant;
+    std::string message;
+  };
+  std::unordered_map<std::string, Unrestored> unrestored_;
+  size_t pending_ = 0;  // of all tenants
   absl::Time last_create_time_ = absl::InfinitePast();
 };
 

@@ -4,11 +4,15 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
 #include "core/input/domain_parameters.h"
 #include "core/input/space_parameters.h"
+#include "google/protobuf/descriptor.h"
+#include "google/protobuf/message.h"
+#include "google/protobuf/unknown_field_set.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
@@ -245,6 +249,30 @@ void SetSurface(const core::SurfaceParameters& surface, v1::MeshParameters& mess
   set(surface.thickness_layers, &v1::SurfaceParameters::set_thickness_layers);
 }
 
+// Whether a message, or one in it, has fields that this program's definition of it has not.
+bool HasUnknownFields(const google::protobuf::Message& message) {
+  const google::protobuf::Reflection& reflection = *message.GetReflection();
+  if (!reflection.GetUnknownFields(message).empty()) {
+    return true;
+  }
+  std::vector<const google::protobuf::FieldDescriptor*> fields;
+  reflection.ListFields(message, &fields);
+  return std::ranges::any_of(fields, [&](const google::protobuf::FieldDescriptor* field) {
+    if (field->cpp_type() != google::protobuf::FieldDescriptor::CPPTYPE_MESSAGE) {
+      return false;
+    }
+    if (!field->is_repeated()) {
+      return HasUnknownFields(reflection.GetMessage(message, field));
+    }
+    for (int i = 0; i < reflection.FieldSize(message, field); ++i) {
+      if (HasUnknownFields(reflection.GetRepeatedMessage(message, field, i))) {
+        return true;
+      }
+    }
+    return false;
+  });
+}
+
 }  // namespace
 
 absl::StatusOr<core::MeshParameters> ParametersFromProto(const v1::MeshParameters& message,
@@ -338,6 +366,9 @@ absl::Status ValidateFor(const core::Input& input, const core::MeshParameters& p
 }
 
 absl::StatusOr<core::MeshParameters> ParametersFromRecord(const v1::MeshParameters& message) {
+  if (HasUnknownFields(message)) {
+    return InvalidParameter("they have a field of a later version of Wellspace", "parameters");
+  }
   ServiceOptions unlimited;
   unlimited.max_threads = std::numeric_limits<int>::max();
   unlimited.max_vertices = core::kMaxVertices;

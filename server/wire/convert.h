@@ -23,6 +23,8 @@ namespace wellspace::server {
 absl::StatusOr<core::MeshParameters> ParametersFromProto(const v1::MeshParameters& message,
                                                          const ServiceOptions& options);
 // The parameters of a message that ParametersToProto has made, whatever the limits of the server are now.
+//
+// Errors:     INVALID_PARAMETERS: it has demands that this version does not know, which must not be left out.
 absl::StatusOr<core::MeshParameters> ParametersFromRecord(const v1::MeshParameters& message);
 
 // Refuses valid parameters that such an input does not have; see core::ValidateDomainParameters and

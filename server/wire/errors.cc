@@ -226,6 +226,10 @@ absl::Status SessionElsewhereError(std::string_view message, std::string_view se
   return status;
 }
 
+bool IsElsewhereError(const absl::Status& status) {
+  return status.GetPayload(kReason) == absl::Cord(v1::ErrorReason_Name(v1::ERROR_REASON_SESSION_ELSEWHERE));
+}
+
 SessionOwnerOf OwnerOf(const absl::Status& status) {
   const absl::optional<absl::Cord> address = status.GetPayload(kAddress);
   const absl::optional<absl::Cord> session = status.GetPayload(kSession);

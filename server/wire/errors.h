@@ -31,6 +31,7 @@ absl::Status MemoryLimitError(std::string_view message, bool may_retry);
 bool IsMemoryLimit(const absl::Status& status);
 // A SESSION_ELSEWHERE of the session with this id. `address`: where the server is that has it; empty: unknown.
 absl::Status SessionElsewhereError(std::string_view message, std::string_view session, std::string_view address);
+bool IsElsewhereError(const absl::Status& status);
 // Of such a status the id, and the address; both are empty where one is not known.
 struct SessionOwnerOf {
   std::string session;

@@ -13,6 +13,7 @@
 #include "core/simplex/locator.h"
 #include "server/services/resource_names.h"
 #include "server/services/session_fields.h"
+#include "server/sessions/session_registry.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
@@ -103,7 +104,7 @@ void LocateCall::Locate(Job& job) {
     vertices = mesh->vertices;
     return allow_outside_ ? absl::OkStatus() : CheckInside(located, offset_);
   });
-  status = use_->session().ErrorOfFile(status);
+  status = environment().sessions.ErrorOfFile(use_->session(), status);
   job.TakeMemory(std::numeric_limits<uint64_t>::max()).Release();
   use_->session().NoteIdle();
   std::lock_guard lock(mutex_);

@@ -12,6 +12,7 @@
 #include "server/jobs/job_size.h"
 #include "server/services/resource_names.h"
 #include "server/services/session_fields.h"
+#include "server/sessions/session_registry.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
@@ -156,7 +157,7 @@ void TransferValuesCall::Work(NumberChunks& values, Job& job) {
   if (absl::IsInvalidArgument(status)) {
     status = Invalid(std::string(status.message()), "values");
   }
-  status = use_->session().ErrorOfFile(status);
+  status = environment().sessions.ErrorOfFile(use_->session(), status);
   memory = job.TakeMemory(carried.values.size() * sizeof(double));
   job.TakeMemory(std::numeric_limits<uint64_t>::max()).Release();
   {

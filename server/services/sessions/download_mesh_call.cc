@@ -11,6 +11,7 @@
 #include "server/jobs/job_size.h"
 #include "server/services/resource_names.h"
 #include "server/services/session_fields.h"
+#include "server/sessions/session_registry.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
@@ -75,7 +76,7 @@ absl::Status DownloadMeshCall::Find() {
     WELLSPACE_RETURN_IF_ERROR(FindDeltas(*session));
   }
   WELLSPACE_RETURN_IF_ERROR(CheckRevision(deltas_.empty() ? mesh_->revision() : deltas_[0]->revision()));
-  WELLSPACE_RETURN_IF_ERROR(session->ErrorOfFile(BeginPart()));
+  WELLSPACE_RETURN_IF_ERROR(environment().sessions.ErrorOfFile(*session, BeginPart()));
   WELLSPACE_RETURN_IF_ERROR(CheckNextChunk());
   // The client has it, or differences that lead to it, from now on: those of later meshes from it are of use.
   session->meshes().deltas().NoteDownload(mesh_->revision());
@@ -132,7 +133,7 @@ void DownloadMeshCall::TakePartIn(Job& job) {
     }
     return absl::OkStatus();
   });
-  status = use_->session().ErrorOfFile(status);
+  status = environment().sessions.ErrorOfFile(use_->session(), status);
   job.TakeMemory(std::numeric_limits<uint64_t>::max()).Release();
   use_->session().NoteIdle();
   std::lock_guard lock(mutex_);
@@ -222,7 +223,7 @@ std::optional<grpc::ByteBuffer> DownloadMeshCall::NextResponse() {
   }
   absl::StatusOr<grpc::ByteBuffer> response = MakeResponse();
   if (!response.ok()) {
-    End(use_->session().ErrorOfFile(response.status()));
+    End(environment().sessions.ErrorOfFile(use_->session(), response.status()));
     return std::nullopt;
   }
   return *std::move(response);

@@ -9,6 +9,7 @@
 #include "server/services/resource_names.h"
 #include "server/services/session_fields.h"
 #include "server/sessions/retry_with_room.h"
+#include "server/sessions/session_registry.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
@@ -142,7 +143,7 @@ absl::Status SetSizesCall::FindPoints(SizeStore& sizes) {
   }
   const absl::StatusOr<core::HugeVector<double>> points = mesh->LoadPoints(core::RunContext());
   if (!points.ok()) {
-    return session.ErrorOfFile(points.status());
+    return environment().sessions.ErrorOfFile(session, points.status());
   }
   sizes.SetPoints(*points);
   return absl::OkStatus();

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <map>
 #include <set>
 #include <string>
 #include <vector>
@@ -206,6 +207,110 @@ TEST_F(SessionRegistryTest, KeepsTheLastHundredOperations) {
   EXPECT_TRUE(session->FindOperation(session->name() + "/operations/103").ok());
   EXPECT_EQ(DetailsOf(session->FindOperation(session->name() + "/operations/3").status()).reason,
             "OPERATION_NOT_FOUND");
+}
+
+// A registry beside others, whose store answers what the test says.
+class SharedRegistryTest : public SessionRegistryTest {
+ protected:
+  std::shared_ptr<Session> CreateOffered() {
+    const std::shared_ptr<Session> session =
+        shared_.Create({.tenant = "a", .parameters = {.dimension = 2}, .labels = {}, .ttl = absl::Minutes(1)}).value();
+    EXPECT_TRUE(session->StartOperation({.dimension = 2}, /*restart=*/false, 0, Submitted).ok());
+    EXPECT_TRUE(session->SetOffer(true).ok());
+    EXPECT_TRUE(session->IsOffered());
+    return session;
+  }
+
+  std::vector<std::string> Listed() {
+    std::vector<std::string> names;
+    for (const std::shared_ptr<Session>& session : shared_.List("a", absl::InfinitePast(), 10, {})) {
+      names.push_back(session->name());
+    }
+    return names;
+  }
+
+  std::map<std::string, absl::Status> answers_;  // of `find`, by name; others: OK
+  absl::StatusOr<std::set<std::string>> offered_ = std::set<std::string>();
+  int finds_ = 0;
+  int lists_ = 0;
+  SessionRegistry shared_{options_,
+                          memory_,
+                          {.wall = [this] { return now_; }, .since_boot = [this] { return since_boot_; }},
+                          *log_,
+                          UnguessableSessionName,
+                          SessionRegistry::Others{.find =
+                                                      [this](const std::string& /*tenant*/, const std::string& name) {
+                                                        ++finds_;
+                                                        return answers_[name];
+                                                      },
+                                                  .list_offered =
+                                                      [this] {
+                                                        ++lists_;
+                                                        return offered_;
+                                                      }}};
+};
+
+TEST_F(SharedRegistryTest, DamageIsToldOfWhereTheSessionIsStillOurs) {
+  const absl::Status damaged = absl::DataLossError("a file is gone");
+  const std::shared_ptr<Session> session = CreateOffered();
+  EXPECT_EQ(shared_.ErrorOfFile(*session, damaged), damaged) << "the store says that it is";
+  EXPECT_EQ(finds_, 1);
+  answers_[session->name()] = SessionElsewhereError("there", session->name(), "there:1");
+  EXPECT_TRUE(IsElsewhereError(shared_.ErrorOfFile(*session, damaged))) << "the other has removed it";
+  answers_[session->name()] = MakeError(v1::ERROR_REASON_STORE_FAILED, "not now");
+  EXPECT_EQ(DetailsOf(shared_.ErrorOfFile(*session, damaged)).reason, "STORE_FAILED");
+  finds_ = 0;
+  EXPECT_TRUE(absl::IsCancelled(shared_.ErrorOfFile(*session, absl::CancelledError(""))));
+  EXPECT_TRUE(session->SetOffer(false).ok());
+  EXPECT_EQ(shared_.ErrorOfFile(*session, damaged), damaged) << "no other may have it";
+  EXPECT_EQ(finds_, 0);
+  session->NoteElsewhere("there:1");
+  EXPECT_TRUE(IsElsewhereError(shared_.ErrorOfFile(*session, damaged)));
+}
+
+TEST_F(SharedRegistryTest, AListAsksTheStoreOnce) {
+  const std::vector<std::shared_ptr<Session>> sessions = {CreateOffered(), CreateOffered(), CreateOffered()};
+  offered_->insert(sessions[0]->name());
+  answers_[sessions[1]->name()] = SessionElsewhereError("there", sessions[1]->name(), "there:1");
+  EXPECT_EQ(Listed(), (std::vector<std::string>{sessions[0]->name(), sessions[2]->name()}))
+      << "the third one's offer begins or ends just now";
+  EXPECT_EQ(lists_, 1);
+  EXPECT_EQ(finds_, 2) << "of those that the store does not name";
+}
+
+TEST_F(SharedRegistryTest, SessionsAreListedWhileTheStoreIsAway) {
+  const std::shared_ptr<Session> session = CreateOffered();
+  const absl::Status away = MakeError(v1::ERROR_REASON_STORE_FAILED, "not now");
+  offered_ = away;
+  EXPECT_EQ(Listed(), std::vector<std::string>{session->name()});
+  offered_ = std::set<std::string>();  // it is away again when the session is asked for
+  answers_[session->name()] = away;
+  EXPECT_EQ(Listed(), std::vector<std::string>{session->name()});
+}
+
+// As one whose parameters are of a later version.
+TEST_F(SharedRegistryTest, WhatCannotBeRestoredIsToldOf) {
+  StoredSession stored{.epoch = 1, .state = {}, .steps = {}, .operations = {}};
+  stored.state.set_name("sessions/later");
+  stored.state.set_tenant("a");
+  stored.state.set_ttl_ns(absl::ToInt64Nanoseconds(absl::Minutes(1)));
+  stored.state.mutable_parameters()->set_dimension(77);
+  for (SessionRegistry* registry : {&registry_, &shared_}) {
+    EXPECT_FALSE(registry->Restore(stored).ok());
+    status_ = registry->Find("a", "sessions/later").status();
+    EXPECT_EQ(DetailsOf(status_).reason, "FILE_DAMAGED");
+    EXPECT_NE(status_.message().find("sessions/later is stored, and this server cannot restore it: "),
+              std::string::npos)
+        << status_;
+    EXPECT_TRUE(absl::IsNotFound(registry->Find("b", "sessions/later").status())) << "it is another tenant's";
+    EXPECT_EQ(registry->Count(), 0);
+  }
+  answers_["sessions/later"] = SessionElsewhereError("there", "sessions/later", "there:1");
+  EXPECT_TRUE(IsElsewhereError(shared_.Find("a", "sessions/later").status())) << "a server that can has it";
+  answers_.clear();
+  stored.state.mutable_parameters()->set_dimension(2);
+  EXPECT_TRUE(shared_.Restore(stored).ok());
+  EXPECT_TRUE(shared_.Find("a", "sessions/later").ok());
 }
 
 }  // namespace

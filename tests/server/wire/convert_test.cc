@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "gmock/gmock.h"
+#include "google/protobuf/unknown_field_set.h"
 #include "gtest/gtest.h"
 #include "server/services/meshing/cloud_receiver.h"
 #include "server/wire/errors.h"
@@ -425,6 +426,22 @@ TEST(CloudReceiver, AcceptsAsManySegmentsAndSeedsAsPoints) {
   EXPECT_EQ(DetailsOf(Accept(receiver, seeds)).reason, "TOO_MANY_POINTS");
   EXPECT_EQ(receiver.features().counts().segments, 10u);
   EXPECT_EQ(receiver.features().counts().seeds, 0u);
+}
+
+// A record of a later version may ask for more than this one knows: it is not meshed without that.
+TEST(ParametersFromRecord, RefusesFieldsOfALaterVersion) {
+  v1::MeshParameters parameters;
+  parameters.set_dimension(3);
+  AddSizeBox(parameters, 0, 1, 0.5);
+  EXPECT_TRUE(ParametersFromRecord(parameters).ok());
+  constexpr int kLater = 12345;
+  v1::MeshParameters whole = parameters;
+  whole.GetReflection()->MutableUnknownFields(&whole)->AddVarint(kLater, 1);
+  EXPECT_THAT(std::string(ParametersFromRecord(whole).status().message()), HasSubstr("a later version of Wellspace"));
+  v1::SizeBox& box = *parameters.mutable_size_boxes(0);
+  box.GetReflection()->MutableUnknownFields(&box)->AddVarint(kLater, 1);
+  EXPECT_FALSE(ParametersFromRecord(parameters).ok()) << "a part of it has such a field";
+  EXPECT_TRUE(ParametersFromProto(parameters, SmallLimits()).ok()) << "a request may";
 }
 
 TEST(CloudReceiver, TakesSegmentsIn2DAlone) {
