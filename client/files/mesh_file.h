@@ -77,7 +77,7 @@ class MeshFile final : public MeshSink {
   //
   // Memory:     4 bytes a vertex, if there are attributes and the format has a place for them.
   // REQUIRES:   `attributes` outlive this.
-  void AddAttributes(std::span<const formats::PointAttribute> attributes) { attributes_ = attributes; }
+  void AddAttributes(std::span<const formats::Attribute> attributes) { attributes_ = attributes; }
 
   // The mesh is periodic along these axes: the file gets the pairs of vertices, if the format has a place for them. To
   // be called before Begin.
@@ -107,7 +107,7 @@ class MeshFile final : public MeshSink {
   bool has_boundary_ = true;
   std::map<int32_t, std::string> part_names_;
   std::vector<int> periodic_axes_;
-  std::span<const formats::PointAttribute> attributes_;
+  std::span<const formats::Attribute> attributes_;
   std::vector<uint32_t> origins_;  // of vertices, if the file gets attributes
   bool has_attributes_ = false;    // the file
   uint64_t tagged_vertices_ = 0;   // that have come

@@ -12,10 +12,10 @@ constexpr std::string_view kSyntax = "<>&\"'/\\";
 
 }  // namespace
 
-std::vector<std::string> NamesToWrite(std::span<const PointAttribute> attributes) {
+std::vector<std::string> NamesToWrite(std::span<const Attribute> attributes) {
   std::set<std::string> taken = {"boundary", "input", "origin", "region", "weights"};
   std::vector<std::string> names;
-  for (const PointAttribute& attribute : attributes) {
+  for (const Attribute& attribute : attributes) {
     std::string name = attribute.name.empty() ? "attribute" : attribute.name;
     for (char& c : name) {
       const auto byte = static_cast<unsigned char>(c);

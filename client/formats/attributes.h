@@ -1,4 +1,4 @@
-// Numbers that points have beside their coordinates: an intensity, a colour, an id.
+// Numbers that points or simplices have beside all else: an intensity, a colour, an id, a solution.
 #ifndef WELLSPACE_CLIENT_FORMATS_ATTRIBUTES_H_
 #define WELLSPACE_CLIENT_FORMATS_ATTRIBUTES_H_
 
@@ -8,17 +8,17 @@
 
 namespace wellspace::formats {
 
-// One number of every point.
-struct PointAttribute {
+// One number of every point, or of every simplex.
+struct Attribute {
   std::string name;
   std::vector<double> values;  // NaN: missing. Whole numbers beyond 2^53 are rounded.
 
-  bool operator==(const PointAttribute&) const = default;
+  bool operator==(const Attribute&) const = default;
 };
 
 // Names of attributes as files of meshes have them: no two are the same, none is that of other data of a mesh, and none
 // has characters that the syntax of a format may use; "_" takes their place.
-std::vector<std::string> NamesToWrite(std::span<const PointAttribute> attributes);
+std::vector<std::string> NamesToWrite(std::span<const Attribute> attributes);
 
 }  // namespace wellspace::formats
 

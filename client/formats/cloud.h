@@ -41,11 +41,11 @@ class LineIndex {
 struct PointCloud {
   std::string name;  // of the file, as messages say it
   int dimension = 0;
-  std::vector<double> points;  // size() x dimension, row-major
-  LineIndex lines;             // of every point, or of none when the file has no lines
-  LineIndex rows;              // of every point in a file without lines, if points were skipped; or of none
-  std::vector<PointAttribute> attributes{};  // if they were asked for, with as many values as there are points
-  uint64_t skipped = 0;                      // points left out since a coordinate is missing or not finite
+  std::vector<double> points;           // size() x dimension, row-major
+  LineIndex lines;                      // of every point, or of none when the file has no lines
+  LineIndex rows;                       // of every point in a file without lines, if points were skipped; or of none
+  std::vector<Attribute> attributes{};  // if they were asked for, with as many values as there are points
+  uint64_t skipped = 0;                 // points left out since a coordinate is missing or not finite
   // Notes for the user on how the file was read, a sentence each: the columns taken, the parts of the file not
   // used.
   std::vector<std::string> notes;

@@ -100,10 +100,11 @@ struct MeshView {
   std::span<const uint32_t> ridges{};          // ridge_count x 2: edges of facets along creases, in 3-D; or none
   std::span<const int32_t> simplex_regions{};  // simplex_count ids; empty: all are of the only region
   std::span<const Region> regions{};
-  std::span<const int> periodic_axes{};          // see MeshShape
-  std::span<const PointAttribute> attributes{};  // of vertices
-  const PartNumbers* part = nullptr;             // see MeshShape
-  MeshOrder order = MeshOrder::kFirst;           // see MeshShape
+  std::span<const int> periodic_axes{};             // see MeshShape
+  std::span<const Attribute> attributes{};          // of vertices
+  std::span<const Attribute> simplex_attributes{};  // for pictures alone: writers of meshes leave them out
+  const PartNumbers* part = nullptr;                // see MeshShape
+  MeshOrder order = MeshOrder::kFirst;              // see MeshShape
 
   uint64_t vertex_count() const { return dimension == 0 ? 0 : points.size() / dimension; }
   uint64_t simplex_count() const { return dimension == 0 ? 0 : simplices.size() / (dimension + 1); }
@@ -149,7 +150,8 @@ struct Mesh {
   std::vector<uint32_t> ridges{};
   std::vector<int32_t> simplex_regions{};
   std::vector<Region> regions{};
-  std::vector<std::string> notes{};  // parts of its file that were left out, a sentence each
+  std::vector<Attribute> simplex_attributes{};  // if they were asked for: of VTK's formats, the data of cells
+  std::vector<std::string> notes{};             // parts of its file that were left out, a sentence each
 
   MeshView View() const {
     return {.dimension = dimension,
@@ -162,7 +164,8 @@ struct Mesh {
             .boundary = boundary,
             .ridges = ridges,
             .simplex_regions = simplex_regions,
-            .regions = regions};
+            .regions = regions,
+            .simplex_attributes = simplex_attributes};
   }
 };
 

@@ -27,7 +27,7 @@ void TakePointData(const std::string& path, MeshOrCloud& read) {
   if (!cloud.ok() || cloud->size() != read.mesh.View().vertex_count()) {
     return;
   }
-  for (PointAttribute& attribute : cloud->attributes) {
+  for (Attribute& attribute : cloud->attributes) {
     if (attribute.name == "input") {
       read.input_vertices = std::find(attribute.values.begin(), attribute.values.end(), 0) - attribute.values.begin();
     } else if (attribute.name == kVtkOrigin) {
@@ -50,7 +50,7 @@ absl::StatusOr<MeshOrCloud> ReadMeshOrCloud(const std::string& path, const Cloud
   MeshOrCloud read;
   absl::Status refusal;
   if (!mesh_format.empty()) {
-    absl::StatusOr<Mesh> mesh = ReadMesh(path);
+    absl::StatusOr<Mesh> mesh = ReadMesh(path, options.keep_attributes ? SimplexData::kKeep : SimplexData::kLeaveOut);
     if (mesh.ok()) {
       read.is_mesh = true;
       read.format = mesh_format;

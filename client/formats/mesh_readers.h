@@ -9,18 +9,23 @@
 
 namespace wellspace::formats {
 
-// `numbers`, unless it is empty, is the name of numbers of the vertices that Mesh::numbers gets, if the file has them.
-absl::StatusOr<Mesh> ReadVtu(const std::string& path, const std::string& numbers);
-// With `numbers` the simplices may be missing.
-absl::StatusOr<Mesh> ReadNpz(const std::string& path, const std::string& numbers);
-absl::StatusOr<Mesh> ReadMsh(const std::string& path, const std::string& numbers);
-absl::StatusOr<Mesh> ReadVtk(const std::string& path);
-absl::StatusOr<Mesh> ReadVtpMesh(const std::string& path);
-absl::StatusOr<Mesh> ReadMedit(const std::string& path);
-absl::StatusOr<Mesh> ReadAdcirc(const std::string& path);
-absl::StatusOr<Mesh> Read2dm(const std::string& path);
+// Numbers beside a mesh that are asked for. A reader leaves out those that its format has no place for.
+struct MeshNumbers {
+  std::string of_vertices{};  // the name of those that Mesh::numbers gets; empty: none
+  bool of_simplices = false;  // all: Mesh::simplex_attributes gets them
+};
+
+absl::StatusOr<Mesh> ReadVtu(const std::string& path, const MeshNumbers& numbers);
+// With numbers of vertices the simplices may be missing.
+absl::StatusOr<Mesh> ReadNpz(const std::string& path, const MeshNumbers& numbers);
+absl::StatusOr<Mesh> ReadMsh(const std::string& path, const MeshNumbers& numbers);
+absl::StatusOr<Mesh> ReadVtk(const std::string& path, const MeshNumbers& numbers);
+absl::StatusOr<Mesh> ReadVtpMesh(const std::string& path, const MeshNumbers& numbers);
+absl::StatusOr<Mesh> ReadMedit(const std::string& path, const MeshNumbers& numbers);
+absl::StatusOr<Mesh> ReadAdcirc(const std::string& path, const MeshNumbers& numbers);
+absl::StatusOr<Mesh> Read2dm(const std::string& path, const MeshNumbers& numbers);
 // `path` is that of either file.
-absl::StatusOr<Mesh> ReadNodeAndEle(const std::string& path);
+absl::StatusOr<Mesh> ReadNodeAndEle(const std::string& path, const MeshNumbers& numbers);
 
 }  // namespace wellspace::formats
 

@@ -25,7 +25,7 @@ absl::Status CancelledWriting(const std::string& path) {
 // INTERNAL unless `mesh` is of the shape.
 absl::Status CheckShape(const MeshView& mesh, const MeshShape& shape) {
   uint64_t attribute_values = 0;
-  for (const PointAttribute& attribute : mesh.attributes) {
+  for (const Attribute& attribute : mesh.attributes) {
     attribute_values += attribute.values.size();
   }
   return CheckComplete(shape, {.vertices = mesh.vertex_count(),
@@ -227,7 +227,7 @@ class SecondOrderWriter final : public MeshWriter {
   const CreateWriter create_;
   const std::stop_token stop_;
   Mesh mesh_;  // of first order, without boundary and regions, which the shape has
-  std::vector<PointAttribute> attributes_;
+  std::vector<Attribute> attributes_;
 };
 
 }  // namespace

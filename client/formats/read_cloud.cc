@@ -151,7 +151,7 @@ absl::StatusOr<PointCloud> ReadCloud(const std::string& path, const CloudOptions
   WELLSPACE_RETURN_IF_ERROR((*row)->handler(file, wanted, cloud));
   WELLSPACE_RETURN_IF_ERROR(TakeFlatPoints(options, is_padded, cloud));
   // Columns in which words stand were given up.
-  std::erase_if(cloud.attributes, [&](const PointAttribute& attribute) {
+  std::erase_if(cloud.attributes, [&](const Attribute& attribute) {
     return cloud.size() == 0 || attribute.values.size() != cloud.size();
   });
   if (cloud.skipped > 0) {

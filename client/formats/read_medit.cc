@@ -245,7 +245,7 @@ class MeditReader {
 
 }  // namespace
 
-absl::StatusOr<Mesh> ReadMedit(const std::string& path) {
+absl::StatusOr<Mesh> ReadMedit(const std::string& path, const MeshNumbers& /*numbers*/) {
   WELLSPACE_ASSIGN_OR_RETURN(InputFile file, InputFile::Open(path));
   LineReader reader(std::move(file));
   return MeditReader(reader).Read();

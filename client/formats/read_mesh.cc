@@ -13,22 +13,15 @@
 namespace wellspace::formats {
 namespace {
 
-using MeshReader = absl::StatusOr<Mesh> (*)(const std::string&);
-
-using NumbersReader = absl::StatusOr<Mesh> (*)(const std::string&, const std::string&);
-
-template <NumbersReader kReader>
-absl::StatusOr<Mesh> Read(const std::string& path) {
-  return kReader(path, "");
-}
+using MeshReader = absl::StatusOr<Mesh> (*)(const std::string&, const MeshNumbers&);
 
 std::span<const Format<MeshReader>> MeshReaders() {
   static const std::vector<Format<MeshReader>> readers = {
-      {"vtu", {".vtu"}, Read<ReadVtu>},
+      {"vtu", {".vtu"}, ReadVtu},
       {"vtk", {".vtk"}, ReadVtk},
       {"vtp", {".vtp"}, ReadVtpMesh},
-      {"npz", {".npz"}, Read<ReadNpz>},
-      {"msh", {".msh"}, Read<ReadMsh>},
+      {"npz", {".npz"}, ReadNpz},
+      {"msh", {".msh"}, ReadMsh},
       {"medit", {".mesh"}, ReadMedit},
       {"adcirc", {".14", ".grd", ".gr3"}, ReadAdcirc},
       {"2dm", {".2dm"}, Read2dm},
@@ -39,12 +32,12 @@ std::span<const Format<MeshReader>> MeshReaders() {
 
 }  // namespace
 
-absl::StatusOr<Mesh> ReadMesh(const std::string& path) {
+absl::StatusOr<Mesh> ReadMesh(const std::string& path, SimplexData data) {
   const auto row = FindFormat(MeshReaders(), path, path == kStandardStream ? "vtu" : "");
   if (!row.ok()) {
     return row.status();
   }
-  return (*row)->handler(path);
+  return (*row)->handler(path, {.of_simplices = data == SimplexData::kKeep});
 }
 
 std::string MeshFormatOf(const std::string& path) {

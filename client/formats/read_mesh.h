@@ -39,12 +39,16 @@
 
 namespace wellspace::formats {
 
+// Whether numbers of simplices, the data of cells of VTK's formats, are kept. One of several numbers is NAME:0, NAME:1
+// and so on.
+enum class SimplexData { kLeaveOut, kKeep };
+
 // Reads the mesh of `path`; standard input ("-") is vtu.
 //
 // Guarantees: coordinates are those of the file, to the bit; every index of a simplex is that of a vertex. Nothing else
 //             is checked: the simplices need not form a mesh.
 // Errors:     of opening and reading; INVALID_ARGUMENT "FILE:LINE: …" for anything but such a mesh.
-absl::StatusOr<Mesh> ReadMesh(const std::string& path);
+absl::StatusOr<Mesh> ReadMesh(const std::string& path, SimplexData data = SimplexData::kLeaveOut);
 
 // The name of the format in which ReadMesh reads `path`; empty: none.
 std::string MeshFormatOf(const std::string& path);

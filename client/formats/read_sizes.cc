@@ -215,11 +215,11 @@ void LeaveOutInvalid(SizedPoints& sized) {
   }
 }
 
-using NumbersReader = absl::StatusOr<Mesh> (*)(const std::string&, const std::string&);
+using NumbersReader = absl::StatusOr<Mesh> (*)(const std::string&, const MeshNumbers&);
 
 template <NumbersReader kReader>
 absl::Status ReadOfMesh(const std::string& path, int dimension, const SizeOptions& options, SizedPoints& sized) {
-  WELLSPACE_ASSIGN_OR_RETURN(Mesh mesh, kReader(path, kSizes));
+  WELLSPACE_ASSIGN_OR_RETURN(Mesh mesh, kReader(path, {.of_vertices = kSizes}));
   sized.cloud.name = path;
   if (mesh.numbers.empty()) {
     return absl::InvalidArgumentError(

@@ -341,7 +341,7 @@ absl::Status WriteMesh(const std::string& path, const std::string& format, const
     const MeshShape shape = mesh.Shape();
     WELLSPACE_ASSIGN_OR_RETURN(const WriterKind writer, FindWriterFor(path, format, shape));
     MeshView held = mesh;
-    held.attributes = writer.HasPlace(kForAttributes) ? mesh.attributes : std::span<const PointAttribute>();
+    held.attributes = writer.HasPlace(kForAttributes) ? mesh.attributes : std::span<const Attribute>();
     held.ridges = writer.HasPlace(kForRidges) ? mesh.ridges : std::span<const uint32_t>();
     of_writer = LossesOf(writer, shape);
     WELLSPACE_RETURN_IF_ERROR(WriteSecondOrder(held, HeldShape(writer, shape), path, writer.create, stop, of_writer));

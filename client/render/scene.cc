@@ -164,11 +164,12 @@ class Categories {
   std::vector<std::pair<std::array<uint32_t, 3>, uint32_t>> tagged_;  // facets and their parts, sorted
 };
 
-// The values of a field at vertices, as colours tell them apart.
+// The values of a field at vertices, or of simplices, as colours tell them apart.
 class FieldValues {
  public:
-  // REQUIRES:   `field` outlives this; it has a number for each vertex.
-  explicit FieldValues(const formats::PointAttribute& field) : field_(field) {
+  // REQUIRES:   `field` outlives this; it has a number for each vertex, or for each simplex.
+  FieldValues(const formats::Attribute& field, bool is_of_simplices)
+      : field_(field), is_of_simplices_(is_of_simplices) {
     for (const double value : field.values) {
       if (std::isfinite(value)) {
         low_ = std::min(low_, value);
@@ -179,12 +180,15 @@ class FieldValues {
 
   bool HasAny() const { return low_ <= high_; }
 
-  // The share of the way from the lowest to the highest value: differences of doubles may be beyond floats.
-  double ShareAt(std::span<const uint32_t> vertices) const {
+  // Of these vertices of a simplex, the share of the way from the lowest to the highest value: differences of doubles
+  // may be beyond floats.
+  double ShareAt(uint64_t simplex, std::span<const uint32_t> vertices) const {
+    if (is_of_simplices_) {
+      return ShareOf(simplex);
+    }
     double sum = 0;
     for (const uint32_t vertex : vertices) {
-      const double value = field_.values[vertex];
-      sum += std::isfinite(value) ? Share(value) : std::numeric_limits<double>::quiet_NaN();
+      sum += ShareOf(vertex);
     }
     return sum / static_cast<double>(vertices.size());
   }
@@ -194,9 +198,15 @@ class FieldValues {
   double high() const { return high_; }
 
  private:
-  double Share(double value) const { return low_ == high_ ? 0.5 : (value / 2 - low_ / 2) / (high_ / 2 - low_ / 2); }
+  double ShareOf(uint64_t number) const {
+    const double value = field_.values[number];
+    return !std::isfinite(value) ? std::numeric_limits<double>::quiet_NaN()
+           : low_ == high_       ? 0.5
+                                 : (value / 2 - low_ / 2) / (high_ / 2 - low_ / 2);
+  }
 
-  const formats::PointAttribute& field_;
+  const formats::Attribute& field_;
+  const bool is_of_simplices_;
   double low_ = std::numeric_limits<double>::infinity();
   double high_ = -std::numeric_limits<double>::infinity();
 };
@@ -227,7 +237,8 @@ absl::StatusOr<Scene> MakePlaneScene(const formats::MeshView& mesh, const std::v
   for (uint64_t simplex = 0; simplex < mesh.simplex_count(); ++simplex) {
     const Simplex<2> corners = SimplexOf<2>(mesh, simplex);
     const std::span<const uint32_t> vertices = mesh.simplices.subspan(3 * simplex, 3);
-    const double share = field == nullptr ? core::Angles<2>(corners).min_deg / kBestAngle : field->ShareAt(vertices);
+    const double share =
+        field == nullptr ? core::Angles<2>(corners).min_deg / kBestAngle : field->ShareAt(simplex, vertices);
     scene.facets.push_back(MakeFacet({corners[0], corners[1], corners[2]}, extent, share, 1));
     scene.facets.back().category = categories.OfSimplex(simplex);
     scene.facets.back().has_dot = DotsAt(dots, vertices);
@@ -435,7 +446,7 @@ absl::StatusOr<Scene> MakeCutScene(const formats::MeshView& mesh, const View& vi
       facet->category = categories.OfFacet(simplex, corners);
       facet->has_dot = DotsAt(view.dots, corners);
       if (field != nullptr) {
-        facet->share = field->ShareAt(corners);
+        facet->share = field->ShareAt(simplex, corners);
       }
       visible.push_back(*facet);
       for (const Point<2>& corner : facet->corners) {
@@ -503,15 +514,16 @@ absl::StatusOr<Scene> MakeScene(const formats::MeshView& mesh, const View& view)
   const Categories categories(mesh, colouring);
   std::optional<FieldValues> field;
   if (colouring == Colouring::kField) {
-    if (view.field->values.size() != mesh.vertex_count()) {
+    const uint64_t count = view.is_field_of_simplices ? mesh.simplex_count() : mesh.vertex_count();
+    if (view.field->values.size() != count) {
       return absl::InvalidArgumentError(absl::StrCat("expected a value of ", view.field->name, " for each of the ",
-                                                     mesh.vertex_count(), " vertices, got ",
-                                                     view.field->values.size()));
+                                                     count, view.is_field_of_simplices ? " simplices" : " vertices",
+                                                     ", got ", view.field->values.size()));
     }
-    field.emplace(*view.field);
+    field.emplace(*view.field, view.is_field_of_simplices);
     if (!field->HasAny()) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("no vertex has a finite value of ", view.field->name, "; expected some"));
+      return absl::InvalidArgumentError(absl::StrCat("no ", view.is_field_of_simplices ? "simplex" : "vertex",
+                                                     " has a finite value of ", view.field->name, "; expected some"));
     }
   }
   const FieldValues* const values = field.has_value() ? &*field : nullptr;

@@ -51,8 +51,10 @@ struct View {
   // None: of the boundary alone by its parts where it has several, else by region where the mesh has several, else by
   // angle.
   std::optional<Colouring> colouring{};
-  // Of kField: a number for each vertex of the mesh, NaN where there is none. A facet has the mean of its corners.
-  const formats::PointAttribute* field = nullptr;
+  // Of kField: a number for each vertex of the mesh, of whose corners a facet has the mean; or for each simplex. NaN
+  // where there is none.
+  const formats::Attribute* field = nullptr;
+  bool is_field_of_simplices = false;
   std::vector<bool> dots{};  // by vertex: whether it has a dot; empty: none has
 };
 

@@ -29,11 +29,11 @@ struct Field {
   std::span<const double> values;
 };
 
-// Numbers of the vertices that the page can colour by.
+// Numbers of the vertices that the page can colour by; of simplices it has simplex_attributes.
 std::vector<Field> FieldsOf(const formats::MeshView& mesh) {
   std::vector<Field> fields;
   bool has_weights = !mesh.weights.empty();
-  for (const formats::PointAttribute& attribute : mesh.attributes) {
+  for (const formats::Attribute& attribute : mesh.attributes) {
     fields.push_back({attribute.name, attribute.values});
     has_weights &= attribute.name != "weights";
   }
@@ -57,7 +57,8 @@ std::string HeaderOf(const formats::MeshView& mesh, const std::vector<Field>& fi
                            {"has_simplex_regions", HasSimplexRegions(mesh)},
                            {"boundary", nlohmann::json::array()},
                            {"regions", nlohmann::json::array()},
-                           {"fields", nlohmann::json::array()}};
+                           {"fields", nlohmann::json::array()},
+                           {"simplex_fields", nlohmann::json::array()}};
   for (const formats::BoundaryPart& part : mesh.boundary) {
     header["boundary"].push_back({{"tag", part.tag}, {"name", part.name}, {"facets", part.facets}});
   }
@@ -66,6 +67,9 @@ std::string HeaderOf(const formats::MeshView& mesh, const std::vector<Field>& fi
   }
   for (const Field& field : fields) {
     header["fields"].push_back(field.name);
+  }
+  for (const formats::Attribute& attribute : mesh.simplex_attributes) {
+    header["simplex_fields"].push_back(attribute.name);
   }
   // ASCII, and nothing that could end the element.
   const std::string text =
@@ -145,6 +149,9 @@ void WritePage(const formats::MeshView& mesh, const PageOptions& options, format
   }
   for (size_t i = 0; i < fields.size(); ++i) {
     WriteArray(absl::StrCat("field", i), fields[i].values, file);
+  }
+  for (size_t i = 0; i < mesh.simplex_attributes.size(); ++i) {
+    WriteArray<double>(absl::StrCat("simplex-field", i), mesh.simplex_attributes[i].values, file);
   }
   file.Write(page.substr(mark + kMeshMark.size()));
 }

@@ -118,7 +118,7 @@ void RequireCloud(const PointCloud& cloud, const CloudOptions& options) {
   for (const std::string& note : cloud.notes) {
     RequireClearMessage(note);
   }
-  for (const formats::PointAttribute& attribute : cloud.attributes) {
+  for (const formats::Attribute& attribute : cloud.attributes) {
     Require(options.keep_attributes, "attributes are kept only if that was asked for");
     Require(attribute.values.size() == cloud.size(), "every point has all attributes");
   }

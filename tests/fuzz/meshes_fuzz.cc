@@ -78,7 +78,7 @@ std::vector<std::vector<uint32_t>> Sorted(const Mesh& mesh) {
 
 // Reads the mesh of `path`, writes it as `copy` and reads that.
 void ReadWriteRead(const std::string& path, const std::string& copy) {
-  const absl::StatusOr<Mesh> mesh = formats::ReadMesh(path);
+  const absl::StatusOr<Mesh> mesh = formats::ReadMesh(path, formats::SimplexData::kKeep);
   if (!mesh.ok()) {
     RequireInvalidArgument(mesh.status());
     RequireClearMessage({mesh.status().message().data(), mesh.status().message().size()});
@@ -87,6 +87,9 @@ void ReadWriteRead(const std::string& path, const std::string& copy) {
   RequireMesh(*mesh);
   for (const std::string& note : mesh->notes) {
     RequireClearMessage(note);
+  }
+  for (const formats::Attribute& data : mesh->simplex_attributes) {
+    Require(data.values.size() == mesh->View().simplex_count(), "every simplex has a number of each attribute");
   }
   const absl::Status written = formats::WriteMesh(copy, "", mesh->View());
   Require(written.ok(), "a mesh can be written:", written.ToString());

@@ -64,7 +64,7 @@ client::Json BoundOf(const formats::Mesh& mesh, bool is_low) {
 }
 
 // name, min, max (null if all are missing) and how many values are missing.
-client::Json AttributeJson(const formats::PointAttribute& attribute) {
+client::Json AttributeJson(const formats::Attribute& attribute) {
   double low = std::numeric_limits<double>::infinity();
   double high = -low;
   uint64_t missing = 0;
@@ -199,7 +199,7 @@ client::Json InfoJson(const std::string& path, const formats::MeshOrCloud& read)
   json["low"] = BoundOf(read.mesh, /*is_low=*/true);
   json["high"] = BoundOf(read.mesh, /*is_low=*/false);
   json["attributes"] = client::Json::array();
-  for (const formats::PointAttribute& attribute : read.attributes) {
+  for (const formats::Attribute& attribute : read.attributes) {
     json["attributes"].push_back(AttributeJson(attribute));
   }
   if (!read.is_mesh) {

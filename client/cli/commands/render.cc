@@ -38,11 +38,11 @@ struct RenderCommand {
 
   absl::Status Render() const;
   absl::StatusOr<formats::MeshOrCloud> Read() const;
-  absl::StatusOr<const formats::PointAttribute*> FieldOf(const formats::MeshOrCloud& read) const;
+  absl::Status SetField(const formats::MeshOrCloud& read, render::View& view) const;
   absl::StatusOr<std::vector<bool>> DotsOf(const formats::MeshOrCloud& read) const;
 };
 
-// The mesh, with the data of its vertices if a field is asked for.
+// The mesh, with the data of its vertices and simplices if a field is asked for.
 absl::StatusOr<formats::MeshOrCloud> RenderCommand::Read() const {
   if ((!field.empty() || draws_points) && mesh_path != formats::kStandardStream) {
     absl::StatusOr<formats::MeshOrCloud> with_data = formats::ReadMeshOrCloud(mesh_path, {.keep_attributes = true});
@@ -55,16 +55,21 @@ absl::StatusOr<formats::MeshOrCloud> RenderCommand::Read() const {
   return read;
 }
 
-// The data of vertices with the name that is asked for.
-absl::StatusOr<const formats::PointAttribute*> RenderCommand::FieldOf(const formats::MeshOrCloud& read) const {
+// Has colours mean the data with the name that is asked for: of vertices or, if these have none, of simplices.
+absl::Status RenderCommand::SetField(const formats::MeshOrCloud& read, render::View& view) const {
+  view.colouring = render::Colouring::kField;
   std::vector<std::string> names;
-  for (const formats::PointAttribute& attribute : read.attributes) {
-    if (attribute.name == field) {
-      return &attribute;
+  for (const bool are_of_simplices : {false, true}) {
+    for (const formats::Attribute& attribute : are_of_simplices ? read.mesh.simplex_attributes : read.attributes) {
+      if (attribute.name == field) {
+        view.field = &attribute;
+        view.is_field_of_simplices = are_of_simplices;
+        return absl::OkStatus();
+      }
+      names.push_back(attribute.name);
     }
-    names.push_back(attribute.name);
   }
-  return absl::InvalidArgumentError(absl::StrCat("--field ", field, ": ", mesh_path, " has no such data of vertices; ",
+  return absl::InvalidArgumentError(absl::StrCat("--field ", field, ": ", mesh_path, " has no such data; ",
                                                  names.empty()
                                                      ? "expected a .vtu, .vtk, .vtp, .14 or .2dm with some"
                                                      : absl::StrCat("expected one of ", absl::StrJoin(names, ", "))));
@@ -100,8 +105,7 @@ absl::Status RenderCommand::Render() const {
   WELLSPACE_ASSIGN_OR_RETURN(const formats::MeshOrCloud read, Read());
   render::View view;
   if (!field.empty()) {
-    WELLSPACE_ASSIGN_OR_RETURN(view.field, FieldOf(read));
-    view.colouring = render::Colouring::kField;
+    WELLSPACE_RETURN_IF_ERROR(SetField(read, view));
   }
   if (draws_points) {
     WELLSPACE_ASSIGN_OR_RETURN(view.dots, DotsOf(read));
@@ -165,8 +169,8 @@ void AddRenderCommand(CLI::App& app, int& exit_code) {
   render
       ->add_option(
           "--field", command->field,
-          "Colours mean these data of vertices, such as a solution; of .vtu, .vtk, .vtp, .14 and .2dm. A vector "
-          "is NAME:0, NAME:1, ...")
+          "Colours mean these data of vertices, such as a solution; of .vtu, .vtk, .vtp, .14 and .2dm; or of cells, of "
+          "the first three. A vector is NAME:0, NAME:1, ...")
       ->type_name("NAME")
       ->excludes("--colour");
   render->add_flag("--points", command->draws_points,

@@ -44,7 +44,7 @@ std::string NameOf(const std::string& path) {
   return path == formats::kStandardStream ? "mesh" : path.substr(path.find_last_of('/') + 1);
 }
 
-// Of VTK's formats with the data of its points.
+// Of VTK's formats with the data of its points and cells.
 absl::StatusOr<formats::MeshOrCloud> ReadMeshWithData(const std::string& path) {
   if (path != formats::kStandardStream && !formats::MeshFormatOf(path).empty()) {
     WELLSPACE_ASSIGN_OR_RETURN(formats::MeshOrCloud read, formats::ReadMeshOrCloud(path, {.keep_attributes = true}));

@@ -206,7 +206,7 @@ class Reader2dm {
 
 }  // namespace
 
-absl::StatusOr<Mesh> Read2dm(const std::string& path) {
+absl::StatusOr<Mesh> Read2dm(const std::string& path, const MeshNumbers& /*numbers*/) {
   WELLSPACE_ASSIGN_OR_RETURN(InputFile file, InputFile::Open(path));
   LineReader reader(std::move(file));
   return Reader2dm(reader, /*skips_invalid=*/false).ReadMesh();

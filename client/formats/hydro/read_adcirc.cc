@@ -247,7 +247,7 @@ int32_t AdcircTypeOf(const std::string& name, int32_t other) {
   return other;
 }
 
-absl::StatusOr<Mesh> ReadAdcirc(const std::string& path) {
+absl::StatusOr<Mesh> ReadAdcirc(const std::string& path, const MeshNumbers& /*numbers*/) {
   WELLSPACE_ASSIGN_OR_RETURN(InputFile file, InputFile::Open(path));
   LineReader reader(std::move(file));
   AdcircGrid grid;

@@ -527,10 +527,10 @@ class MshReader {
 
 }  // namespace
 
-absl::StatusOr<Mesh> ReadMsh(const std::string& path, const std::string& numbers) {
+absl::StatusOr<Mesh> ReadMsh(const std::string& path, const MeshNumbers& numbers) {
   WELLSPACE_ASSIGN_OR_RETURN(InputFile file, InputFile::Open(path));
   LineReader reader(std::move(file));
-  return MshReader(reader, numbers).Read();
+  return MshReader(reader, numbers.of_vertices).Read();
 }
 
 absl::Status ReadMshPoints(LineReader& reader, const CloudOptions& options, PointCloud& cloud) {

@@ -161,7 +161,8 @@ absl::Status ReadRegions(ZipReader& archive, const std::string& file, Mesh& mesh
 
 }  // namespace
 
-absl::StatusOr<Mesh> ReadNpz(const std::string& path, const std::string& numbers) {
+absl::StatusOr<Mesh> ReadNpz(const std::string& path, const MeshNumbers& wanted) {
+  const std::string& numbers = wanted.of_vertices;
   WELLSPACE_ASSIGN_OR_RETURN(InputFile file, InputFile::Open(path));
   const std::string name = file.name();
   WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<ZipReader> archive, ZipReader::Open(std::move(file)));

@@ -203,7 +203,7 @@ absl::Status ReadNode(LineReader& reader, const CloudOptions& options, PointClou
   return ExpectEnd(reader, header.count, "points");
 }
 
-absl::StatusOr<Mesh> ReadNodeAndEle(const std::string& path) {
+absl::StatusOr<Mesh> ReadNodeAndEle(const std::string& path, const MeshNumbers& /*numbers*/) {
   WELLSPACE_ASSIGN_OR_RETURN(InputFile node_file, InputFile::Open(WithExtension(path, ".node")));
   WELLSPACE_ASSIGN_OR_RETURN(InputFile ele_file, InputFile::Open(WithExtension(path, ".ele")));
   PointCloud cloud;

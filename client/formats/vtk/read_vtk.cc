@@ -1,5 +1,6 @@
 // VTK's legacy format: points with their data, and meshes.
 #include <cstdint>
+#include <deque>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -88,7 +89,9 @@ class VtkPointsReader final : public VtkLegacyReader {
 
 class VtkMeshReader final : public VtkLegacyReader {
  public:
-  explicit VtkMeshReader(LineReader& reader) : VtkLegacyReader(reader) { grid_.file = reader.name(); }
+  VtkMeshReader(LineReader& reader, bool keeps_cell_data) : VtkLegacyReader(reader), keeps_cell_data_(keeps_cell_data) {
+    grid_.file = reader.name();
+  }
 
   absl::StatusOr<Mesh> Read() {
     WELLSPACE_RETURN_IF_ERROR(ReadSections());
@@ -116,10 +119,10 @@ class VtkMeshReader final : public VtkLegacyReader {
   Columns& Coordinates() override { return coordinates_; }
 
   Columns* Place(const Data& data) override {
-    if (data.components != 1) {
-      return nullptr;
-    }
     Columns* place = nullptr;
+    if (data.components != 1) {
+      return PlaceOfCellData(data);
+    }
     if (data.of == Data::Of::kPoints && data.name == "weights") {
       place = &weights_;
       grid_.has_weights = true;
@@ -131,11 +134,19 @@ class VtkMeshReader final : public VtkLegacyReader {
       grid_.has_regions = true;
     } else if (data.of == Data::Of::kFile && data.name == kVtkNames && data.is_whole) {
       place = &names_;
+    } else {
+      return PlaceOfCellData(data);
     }
     if (place != nullptr) {
       *place = Columns(1);
     }
     return place;
+  }
+
+  Columns* PlaceOfCellData(const Data& data) {
+    return keeps_cell_data_ && data.of == Data::Of::kCells
+               ? &cell_arrays_.emplace_back(DataNames(data.name, data.components), Columns()).second
+               : nullptr;
   }
 
   bool WantsCells(std::string_view, uint64_t) override { return true; }
@@ -201,10 +212,17 @@ class VtkMeshReader final : public VtkLegacyReader {
     for (const double letter : names_.empty() ? std::vector<double>() : names_[0]) {
       grid_.names += static_cast<char>(static_cast<uint8_t>(WholeOr(letter, 0)));
     }
+    for (auto& [names, columns] : cell_arrays_) {
+      for (size_t i = 0; i < names.size(); ++i) {
+        grid_.cell_data.push_back({std::move(names[i]), std::move(columns[i])});
+      }
+    }
     return absl::OkStatus();
   }
 
+  const bool keeps_cell_data_;
   VtkGrid grid_;
+  std::deque<std::pair<std::vector<std::string>, Columns>> cell_arrays_;  // each keeps its place
   Columns coordinates_ = Columns(3);
   Columns weights_;
   Columns tags_;
@@ -218,10 +236,10 @@ absl::Status ReadVtkPoints(LineReader& reader, const CloudOptions& options, Poin
   return VtkPointsReader(reader, options, cloud).Read();
 }
 
-absl::StatusOr<Mesh> ReadVtk(const std::string& path) {
+absl::StatusOr<Mesh> ReadVtk(const std::string& path, const MeshNumbers& numbers) {
   WELLSPACE_ASSIGN_OR_RETURN(InputFile file, InputFile::Open(path));
   LineReader reader(std::move(file));
-  return VtkMeshReader(reader).Read();
+  return VtkMeshReader(reader, numbers.of_simplices).Read();
 }
 
 }  // namespace wellspace::formats

@@ -27,8 +27,6 @@
 namespace wellspace::formats {
 namespace {
 
-constexpr uint64_t kMaxVtkComponents = 64;
-
 // The points of a file, a row each, and their data.
 struct PointTable {
   std::vector<std::string> names = {"x", "y", "z"};
@@ -50,28 +48,12 @@ class VtkXmlPointsReader final : public VtkXmlReader {
     PointTable table;
     table.columns = ColumnsOf(coordinates_, 3);
     coordinates_ = {};
-    for (const PointArray& array : arrays_) {
-      if (array.values.size() != array.components * point_count()) {
-        return FileError(absl::StrCat("expected ", array.components, " values of ", Quote(array.name), " for each of ",
-                                      point_count(), " points, got ", array.values.size()));
-      }
-      for (std::vector<double>& column : ColumnsOf(array.values, array.components)) {
-        table.columns.push_back(std::move(column));
-      }
-      const std::vector<std::string> components = DataNames(array.name, array.components);
-      table.names.insert(table.names.end(), components.begin(), components.end());
-    }
+    WELLSPACE_RETURN_IF_ERROR(AddColumns(arrays_, point_count(), "points", table.names, table.columns));
     table.cells = cell_count() - std::min(vertex_cells_, cell_count());
     return table;
   }
 
  private:
-  struct PointArray {
-    std::string name;
-    uint64_t components = 1;
-    std::vector<double> values;
-  };
-
   bool IsImage() const { return kind_ == "ImageData"; }
   bool IsRectilinear() const { return kind_ == "RectilinearGrid"; }
 
@@ -123,22 +105,7 @@ class VtkXmlPointsReader final : public VtkXmlReader {
         xml().Attribute("type") == "String") {
       return absl::OkStatus();
     }
-    PointArray array{.name = std::string(xml().Attribute("Name")), .components = 1, .values = {}};
-    const std::string_view components = xml().Attribute("NumberOfComponents");
-    if (!components.empty() &&
-        (!ParseUnsigned(components, kMaxVtkComponents, array.components) || array.components == 0)) {
-      return xml().Error(
-          absl::StrCat("expected NumberOfComponents from 1 to ", kMaxVtkComponents, ", got ", Quote(components)));
-    }
-    // That of the pieces before goes on.
-    for (PointArray& begun : arrays_) {
-      if (first_point() > 0 && begun.name == array.name && begun.components == array.components &&
-          begun.values.size() == first_point() * begun.components) {
-        return ReadData(begun);
-      }
-    }
-    arrays_.push_back(std::move(array));
-    return ReadData(arrays_.back());
+    return ReadData(first_point(), point_count(), arrays_);
   }
 
   // The points of a grid that are told by its axes.
@@ -168,20 +135,11 @@ class VtkXmlPointsReader final : public VtkXmlReader {
     return absl::OkStatus();
   }
 
-  absl::Status ReadData(PointArray& array) {
-    WELLSPACE_RETURN_IF_ERROR(ReadAnyNumbers(array.values));
-    const uint64_t wanted = array.components * point_count();
-    if (xml().Attribute("type") == "Bit" && array.values.size() > wanted && array.values.size() - wanted < 8) {
-      array.values.resize(wanted);  // the bits that fill the last byte
-    }
-    return absl::OkStatus();
-  }
-
   const std::string kind_;
   const uint64_t file_bytes_;
   const CloudOptions& options_;
   std::vector<double> coordinates_;
-  std::vector<PointArray> arrays_;
+  std::vector<DataArray> arrays_;
   uint64_t vertex_cells_ = 0;
   VtkImage image_;
   // Of a rectilinear piece.

@@ -18,8 +18,8 @@ namespace {
 // Cells by their kinds, each with vertices and ends of its own.
 class VtpMeshReader final : public VtkMeshXmlReader {
  public:
-  VtpMeshReader(std::string_view document, const std::string& name)
-      : VtkMeshXmlReader(document, name, "PolyData", /*numbers=*/"") {}
+  VtpMeshReader(std::string_view document, const std::string& name, bool keeps_cell_data)
+      : VtkMeshXmlReader(document, name, "PolyData", {.of_simplices = keeps_cell_data}) {}
 
  private:
   struct Section {
@@ -59,10 +59,10 @@ class VtpMeshReader final : public VtkMeshXmlReader {
 
 }  // namespace
 
-absl::StatusOr<Mesh> ReadVtpMesh(const std::string& path) {
+absl::StatusOr<Mesh> ReadVtpMesh(const std::string& path, const MeshNumbers& numbers) {
   WELLSPACE_ASSIGN_OR_RETURN(InputFile file, InputFile::Open(path));
   WELLSPACE_ASSIGN_OR_RETURN(const std::string document, file.ReadAll());
-  return VtpMeshReader(document, file.name()).Read();
+  return VtpMeshReader(document, file.name(), numbers.of_simplices).Read();
 }
 
 }  // namespace wellspace::formats

@@ -14,7 +14,7 @@ namespace {
 
 class VtuReader final : public VtkMeshXmlReader {
  public:
-  VtuReader(std::string_view document, const std::string& name, const std::string& numbers)
+  VtuReader(std::string_view document, const std::string& name, const MeshNumbers& numbers)
       : VtkMeshXmlReader(document, name, "UnstructuredGrid", numbers) {}
 
  private:
@@ -46,7 +46,7 @@ class VtuReader final : public VtkMeshXmlReader {
 
 }  // namespace
 
-absl::StatusOr<Mesh> ReadVtu(const std::string& path, const std::string& numbers) {
+absl::StatusOr<Mesh> ReadVtu(const std::string& path, const MeshNumbers& numbers) {
   WELLSPACE_ASSIGN_OR_RETURN(InputFile file, InputFile::Open(path));
   WELLSPACE_ASSIGN_OR_RETURN(const std::string document, file.ReadAll());
   return VtuReader(document, file.name(), numbers).Read();

@@ -52,6 +52,7 @@ class VtkMeshMaker {
     WELLSPACE_RETURN_IF_ERROR(TakePoints());
     mesh_.weights = std::move(grid_.weights);
     mesh_.numbers = std::move(grid_.numbers);
+    TakeCellData();
     for (const absl::string_view line : absl::StrSplit(grid_.names, '\n')) {
       TakeNameLine({line.data(), line.size()}, &facets_, &regions_);
     }
@@ -89,6 +90,12 @@ class VtkMeshMaker {
     }
     if (g.has_regions && g.regions.size() != g.cells) {
       return FileError(absl::StrCat("expected a region for each of ", g.cells, " cells, got ", g.regions.size()));
+    }
+    for (const Attribute& data : g.cell_data) {
+      if (data.values.size() != g.cells) {
+        return FileError(absl::StrCat("cell data ", Quote(data.name), ": expected a number for each of ", g.cells,
+                                      " cells, got ", data.values.size()));
+      }
     }
     return absl::OkStatus();
   }
@@ -136,6 +143,9 @@ class VtkMeshMaker {
         return FileError(absl::StrCat("cell ", cell, ": expected a region of at most 32 bits, got ", region));
       }
       regions_.Add(static_cast<int32_t>(region));
+      if (!grid_.cell_data.empty()) {
+        simplex_cells_.push_back(cell);
+      }
       mesh_.simplices.insert(mesh_.simplices.end(), vertices_.begin(), vertices_.end());
       return absl::OkStatus();
     }
@@ -165,6 +175,16 @@ class VtkMeshMaker {
     return absl::OkStatus();
   }
 
+  void TakeCellData() {
+    for (Attribute& data : grid_.cell_data) {
+      for (size_t simplex = 0; simplex < simplex_cells_.size(); ++simplex) {
+        data.values[simplex] = data.values[simplex_cells_[simplex]];  // at or behind its place
+      }
+      data.values.resize(simplex_cells_.size());
+    }
+    mesh_.simplex_attributes = std::move(grid_.cell_data);
+  }
+
   void NoteSkipped() {
     if (skipped_ > 0) {
       mesh_.notes.push_back(absl::StrCat(grid_.file, ": ", skipped_, skipped_ == 1 ? " cell is" : " cells are",
@@ -178,8 +198,9 @@ class VtkMeshMaker {
   Mesh mesh_;
   FacetSorter facets_;
   RegionCollector regions_;
-  std::vector<uint32_t> vertices_;  // of a cell
-  uint64_t skipped_ = 0;            // cells
+  std::vector<uint32_t> vertices_;     // of a cell
+  std::vector<size_t> simplex_cells_;  // of each simplex, if cells have data
+  uint64_t skipped_ = 0;               // cells
 };
 
 }  // namespace

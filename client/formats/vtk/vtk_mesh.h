@@ -27,12 +27,14 @@ struct VtkGrid {
   bool has_tags = false;
   std::vector<int64_t> tags{};  // of cells
   bool has_regions = false;
-  std::vector<int64_t> regions{};  // of cells
-  std::string names{};             // as NameLines has them
+  std::vector<int64_t> regions{};      // of cells
+  std::vector<Attribute> cell_data{};  // that is asked for
+  std::string names{};                 // as NameLines has them
 };
 
 // The mesh of the tetrahedra of a grid or, if there are none, of its triangles in the plane z = 0. Cells of one
-// dimension less are facets where cells have tags; other points and lines are left out, with a note. Without any cells
+// dimension less are facets where cells have tags; other points and lines are left out, with a note. Data of cells are
+// those of the simplices. Without any cells
 // the mesh has no simplices, and dimension 3 unless the names say that it is flat.
 //
 // Errors:     INVALID_ARGUMENT unless as many values have come as there are points and cells; for other cells; for

@@ -12,6 +12,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/formats/mesh.h"
+#include "client/formats/mesh_readers.h"
 #include "client/formats/vtk/vtk_cells.h"
 #include "client/formats/vtk/vtk_mesh.h"
 #include "client/formats/vtk/vtk_xml.h"
@@ -27,14 +28,20 @@ class VtkMeshXmlReader : public VtkXmlReader {
   absl::StatusOr<Mesh> Read() {
     WELLSPACE_RETURN_IF_ERROR(ReadElements());
     grid_.points = point_count();
+    std::vector<std::string> names;
+    std::vector<std::vector<double>> columns;
+    WELLSPACE_RETURN_IF_ERROR(AddColumns(cell_arrays_, grid_.cells, "cells", names, columns));
+    for (size_t i = 0; i < names.size(); ++i) {
+      grid_.cell_data.push_back({std::move(names[i]), std::move(columns[i])});
+    }
     return MakeVtkMesh(std::move(grid_));
   }
 
  protected:
-  VtkMeshXmlReader(std::string_view document, const std::string& name, const char* kind, const std::string& numbers)
-      : VtkXmlReader(document, name, kind) {
+  VtkMeshXmlReader(std::string_view document, const std::string& name, const char* kind, const MeshNumbers& numbers)
+      : VtkXmlReader(document, name, kind), keeps_cell_data_(numbers.of_simplices) {
     grid_.file = name;
-    grid_.numbers_name = numbers;
+    grid_.numbers_name = numbers.of_vertices;
   }
 
   // An array of another element of a piece.
@@ -95,10 +102,15 @@ class VtkMeshXmlReader : public VtkXmlReader {
       }
       return absl::OkStatus();
     }
+    if (parent == "CellData" && keeps_cell_data_ && type != "String") {
+      return ReadData(first_cell(), end_cell(), cell_arrays_);
+    }
     return ReadCells(parent, array);
   }
 
+  const bool keeps_cell_data_;
   VtkGrid grid_;
+  std::vector<DataArray> cell_arrays_;
 };
 
 }  // namespace wellspace::formats

@@ -12,12 +12,14 @@
 #include "absl/strings/numbers.h"
 #include "client/formats/coordinate.h"
 #include "client/formats/io/number.h"
+#include "client/formats/point_rows.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
 
 constexpr size_t kMaxDepth = 64;
+constexpr uint64_t kMaxComponents = 64;  // of data of a point or a cell
 
 // As files call them.
 constexpr std::array<std::pair<std::string_view, VtkCompressor>, 4> kCompressors = {
@@ -119,9 +121,7 @@ absl::Status VtkXmlReader::StartPiece() {
   uint64_t cells = 0;
   if (kind_ == "StructuredGrid" || kind_ == "RectilinearGrid" || kind_ == "ImageData") {
     WELLSPACE_RETURN_IF_ERROR(TakeExtent(points, cells));
-    first_point_ = point_count_;
-    point_count_ += points;
-    cell_count_ += cells;
+    AddPiece(points, cells, 0);
     return absl::OkStatus();
   }
   if (!ParseUnsigned(xml_.Attribute("NumberOfPoints"), kMaxCount - point_count_, points)) {
@@ -137,10 +137,20 @@ absl::Status VtkXmlReader::StartPiece() {
       cells += of_kind;
     }
   }
+  uint64_t vertex_cells = 0;
+  if (!has_cells && !ParseUnsigned(xml_.Attribute("NumberOfVerts"), kMaxCount, vertex_cells)) {
+    vertex_cells = 0;  // it may be left out
+  }
+  AddPiece(points, cells, vertex_cells);
+  return absl::OkStatus();
+}
+
+void VtkXmlReader::AddPiece(uint64_t points, uint64_t cells, uint64_t vertex_cells) {
   first_point_ = point_count_;
   point_count_ += points;
   cell_count_ += cells;
-  return absl::OkStatus();
+  first_cell_ = end_cell_;
+  end_cell_ += cells + vertex_cells;
 }
 
 // "0 3 0 4 0 0": the first and the last point of each axis.
@@ -281,6 +291,44 @@ absl::Status VtkXmlReader::ReadArray(std::vector<Value>& values) {
 
 template absl::Status VtkXmlReader::ReadArray<double>(std::vector<double>&);
 template absl::Status VtkXmlReader::ReadArray<int64_t>(std::vector<int64_t>&);
+
+absl::Status VtkXmlReader::ReadData(uint64_t first, uint64_t end, std::vector<DataArray>& arrays) {
+  DataArray array{.name = std::string(xml_.Attribute("Name"))};
+  const std::string_view components = xml_.Attribute("NumberOfComponents");
+  if (!components.empty() && (!ParseUnsigned(components, kMaxComponents, array.components) || array.components == 0)) {
+    return xml_.Error(
+        absl::StrCat("expected NumberOfComponents from 1 to ", kMaxComponents, ", got ", Quote(components)));
+  }
+  // That of the pieces before goes on.
+  const auto begun = std::find_if(arrays.begin(), arrays.end(), [&](const DataArray& other) {
+    return first > 0 && other.name == array.name && other.components == array.components &&
+           other.values.size() == first * other.components;
+  });
+  DataArray& whole = begun != arrays.end() ? *begun : arrays.emplace_back(std::move(array));
+  WELLSPACE_RETURN_IF_ERROR(ReadAnyNumbers(whole.values));
+  const uint64_t wanted = whole.components * end;
+  if (xml_.Attribute("type") == "Bit" && whole.values.size() > wanted && whole.values.size() - wanted < 8) {
+    whole.values.resize(wanted);  // the bits that fill the last byte
+  }
+  return absl::OkStatus();
+}
+
+absl::Status VtkXmlReader::AddColumns(const std::vector<DataArray>& arrays, uint64_t rows, const char* what,
+                                      std::vector<std::string>& names,
+                                      std::vector<std::vector<double>>& columns) const {
+  for (const DataArray& array : arrays) {
+    if (array.values.size() != array.components * rows) {
+      return FileError(absl::StrCat("expected ", array.components, " values of ", Quote(array.name), " for each of ",
+                                    rows, " ", what, ", got ", array.values.size()));
+    }
+    for (std::vector<double>& column : ColumnsOf(array.values, array.components)) {
+      columns.push_back(std::move(column));
+    }
+    const std::vector<std::string> components = DataNames(array.name, array.components);
+    names.insert(names.end(), components.begin(), components.end());
+  }
+  return absl::OkStatus();
+}
 
 absl::Status VtkXmlReader::ReadAnyNumbers(std::vector<double>& values) {
   const std::string type(xml_.Attribute("type"));

@@ -48,6 +48,9 @@ class VtkXmlReader {
   uint64_t point_count() const { return point_count_; }
   uint64_t cell_count() const { return cell_count_; }
   uint64_t first_point() const { return first_point_; }
+  // The rows that data of cells of that piece have, cells that are vertices included.
+  uint64_t first_cell() const { return first_cell_; }
+  uint64_t end_cell() const { return end_cell_; }
   // Of the piece of a grid that is being read.
   const VtkExtent& extent() const { return extent_; }
 
@@ -67,11 +70,27 @@ class VtkXmlReader {
   // more may come.
   absl::Status ReadAnyNumbers(std::vector<double>& values);
 
+  // Data of points or of cells.
+  struct DataArray {
+    std::string name;
+    uint64_t components = 1;
+    std::vector<double> values{};  // as many of each row, for the rows of all pieces so far
+  };
+  // Appends the array of the current element, data of the rows `first` to `end` of all pieces, to that of its name that
+  // the pieces before have begun, or begins one.
+  absl::Status ReadData(uint64_t first, uint64_t end, std::vector<DataArray>& arrays);
+  // Appends the components of each of `arrays`, as DataNames names them.
+  //
+  // Errors:     INVALID_ARGUMENT for an array of another number of values than `rows` have; `what` is their kind.
+  absl::Status AddColumns(const std::vector<DataArray>& arrays, uint64_t rows, const char* what,
+                          std::vector<std::string>& names, std::vector<std::vector<double>>& columns) const;
+
  private:
   absl::Status EndElement();
   absl::Status StartElement();
   absl::Status StartFile();
   absl::Status StartPiece();
+  void AddPiece(uint64_t points, uint64_t cells, uint64_t vertex_cells);
   absl::Status TakeExtent(uint64_t& points, uint64_t& cells);
 
   // The text of the current element, an array; none if it has none.
@@ -98,6 +117,8 @@ class VtkXmlReader {
   std::string_view appended_;  // behind its '_'
   uint64_t pieces_ = 0;
   uint64_t first_point_ = 0;
+  uint64_t first_cell_ = 0;
+  uint64_t end_cell_ = 0;
   uint64_t point_count_ = 0;
   uint64_t cell_count_ = 0;
   VtkExtent extent_;

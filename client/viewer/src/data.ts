@@ -15,7 +15,7 @@ export interface Region {
   readonly name: string;
 }
 
-/** Numbers of the vertices. */
+/** Numbers of the vertices, or of the simplices. */
 export interface Field {
   readonly name: string;
   readonly values: Float64Array;
@@ -33,7 +33,9 @@ export interface MeshData {
   readonly regions: readonly Region[];
   /** For each simplex the index of its region; empty: all are of the first. */
   readonly regionOf: Uint32Array;
+  /** Of the vertices. */
   readonly fields: readonly Field[];
+  readonly simplexFields: readonly Field[];
 }
 
 interface Header {
@@ -47,6 +49,7 @@ interface Header {
   regions: Region[];
   has_simplex_regions: boolean;
   fields: string[];
+  simplex_fields: string[];
 }
 
 export class DataError extends Error {}
@@ -144,6 +147,10 @@ export function readMesh(): MeshData {
     regions: header.regions,
     regionOf: header.has_simplex_regions ? new Uint32Array(bytesOf("mesh-regions", m * 4)) : new Uint32Array(0),
     fields: header.fields.map((name, i) => ({ name, values: new Float64Array(bytesOf(`mesh-field${i}`, n * 8)) })),
+    simplexFields: header.simplex_fields.map((name, i) => ({
+      name,
+      values: new Float64Array(bytesOf(`mesh-simplex-field${i}`, m * 8)),
+    })),
   };
   checkIndices("simplices", mesh.simplices, n);
   checkIndices("facets", mesh.facets, n);

@@ -162,8 +162,17 @@ function withScale(mesh: MeshData): { scaled: MeshData; unit: number } {
   return { scaled: { ...mesh, points: mesh.points.map((x) => x / unit) }, unit };
 }
 
-/** The measures that a mesh has, by name; their numbers are computed when they are asked for. */
-export function measuresOf(mesh: MeshData): Array<{ id: string; label: string; group: string; make: () => Measure }> {
+/** A measure that a mesh has, by name; its numbers are computed when they are asked for. */
+export interface NamedMeasure {
+  readonly id: string;
+  readonly label: string;
+  readonly group: "Quality" | "Size" | "Data";
+  /** Whether the vertices have the numbers, of which an element has the mean. */
+  readonly isOfVertices: boolean;
+  readonly make: () => Measure;
+}
+
+export function measuresOf(mesh: MeshData): NamedMeasure[] {
   const is3d = mesh.dimension === 3;
   const angle = is3d ? "Smallest dihedral angle" : "Smallest angle";
   const measure = (
@@ -173,10 +182,11 @@ export function measuresOf(mesh: MeshData): Array<{ id: string; label: string; g
     worst: Measure["worst"],
     logarithmic: boolean,
     values: () => Float64Array,
-  ) => ({
+  ): NamedMeasure => ({
     id,
     label,
     group: id === "size" ? "Size" : "Quality",
+    isOfVertices: false,
     make: (): Measure => ({ id, label, unit, worst, logarithmic, values: values() }),
   });
   const { scaled, unit } = withScale(mesh);
@@ -196,23 +206,20 @@ export function measuresOf(mesh: MeshData): Array<{ id: string; label: string; g
         : triangles(scaled, (a, b, c) => unit * Math.max(a, b, c)),
     ),
   ];
-  mesh.fields.forEach((field, i) => {
-    list.push({
-      id: `field${i}`,
-      label: field.name,
-      group: "Data",
-      make: () => ({
-        id: `field${i}`,
-        label: field.name,
-        unit: "",
-        worst: null,
-        logarithmic: false,
-        values: meansOf(mesh, field.values),
-        ofVertices: field.values,
-      }),
-    });
+  const data = (id: string, label: string, numbers: () => Pick<Measure, "values" | "ofVertices">): NamedMeasure => ({
+    id,
+    label,
+    group: "Data",
+    isOfVertices: !id.startsWith("simplex"),
+    make: () => ({ id, label, unit: "", worst: null, logarithmic: false, ...numbers() }),
   });
-  return list;
+  const ofVertices = mesh.fields.map(({ name, values }, i) =>
+    data(`field${i}`, name, () => ({ values: meansOf(mesh, values), ofVertices: values })),
+  );
+  const ofSimplices = mesh.simplexFields.map(({ name, values }, i) =>
+    data(`simplex-field${i}`, name, () => ({ values })),
+  );
+  return [...list, ...ofVertices, ...ofSimplices];
 }
 
 /** The range of the numbers that are finite; null where there is none. */

@@ -314,7 +314,7 @@ export class Panel {
       const region = view.mesh.regions[view.regionOf(hit.element)];
       rows.push(["Region", `${region.name || "no name"}, ${region.id}`]);
     }
-    for (const { id } of view.measures.filter((measure) => measure.group !== "Data")) {
+    for (const { id } of view.measures.filter(({ isOfVertices }) => !isOfVertices)) {
       const { measure } = view.measure(id);
       rows.push([measure.label, formatNumber(measure.values[hit.element], measure.unit)]);
     }

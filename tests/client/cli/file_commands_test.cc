@@ -42,8 +42,8 @@ TEST_F(FileCommandsTest, VerticesHaveTheAttributesOfTheirPoints) {
     const absl::StatusOr<formats::PointCloud> mesh = formats::ReadCloud(Path(name), {.keep_attributes = true});
     ASSERT_TRUE(mesh.ok()) << mesh.status();
     ASSERT_EQ(mesh->attributes.size(), 5);  // input, origin, boundary
-    const formats::PointAttribute& id = mesh->attributes[3];
-    const formats::PointAttribute& heat = mesh->attributes[4];
+    const formats::Attribute& id = mesh->attributes[3];
+    const formats::Attribute& heat = mesh->attributes[4];
     EXPECT_EQ(id.name, "id");
     EXPECT_EQ(heat.name, "heat");
     ASSERT_GT(mesh->size(), 5);
@@ -244,7 +244,7 @@ TEST_F(FileCommandsTest, ConvertMakesVerticesOfPoints) {
   EXPECT_EQ(nlohmann::json::parse(result.out)["kind"], "cloud");
   const absl::StatusOr<formats::PointCloud> cloud = formats::ReadCloud(Path("a.vtu"), {.keep_attributes = true});
   ASSERT_TRUE(cloud.ok()) << cloud.status();
-  EXPECT_EQ(cloud->attributes[1], (formats::PointAttribute{"id", {7, 8, 9, 10, 11, 12}}));
+  EXPECT_EQ(cloud->attributes[1], (formats::Attribute{"id", {7, 8, 9, 10, 11, 12}}));
   ASSERT_EQ(RunWellspace({"convert", Path("a.csv"), Path("b.vtu"), "--no-attributes"}).exit_code, 0);
   EXPECT_THAT(folder_.Read("b.vtu"), Not(HasSubstr("\"id\"")));
 }

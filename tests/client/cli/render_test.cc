@@ -286,7 +286,7 @@ formats::Mesh TwoRegions() {
 
 TEST(SceneTest, ColoursOfAFieldAreMeansOfCorners) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  const formats::PointAttribute field = {.name = "heat", .values = {-2, 1, 10, nan}};
+  const formats::Attribute field = {.name = "heat", .values = {-2, 1, 10, nan}};
   const View view = {.colouring = Colouring::kField, .field = &field};
   const absl::StatusOr<Scene> scene = MakeScene(TwoRegions().View(), view);
   ASSERT_TRUE(scene.ok()) << scene.status();
@@ -302,7 +302,7 @@ TEST(SceneTest, ColoursOfAFieldAreMeansOfCorners) {
 // The cube's facets at x = 0, where the field is 0, and others.
 TEST(SceneTest, ColoursOfAFieldOnACut) {
   const formats::Mesh mesh = Cubes(1);
-  formats::PointAttribute field = {.name = "x", .values = {}};
+  formats::Attribute field = {.name = "x", .values = {}};
   for (uint64_t vertex = 0; vertex < mesh.View().vertex_count(); ++vertex) {
     field.values.push_back(mesh.points[3 * vertex] * 1e308);  // whose sums are beyond doubles
   }
@@ -314,17 +314,40 @@ TEST(SceneTest, ColoursOfAFieldOnACut) {
   EXPECT_EQ(scene->facets[1].share, 0);
 }
 
+TEST(SceneTest, ColoursOfAFieldOfSimplices) {
+  formats::Attribute field = {.name = "pressure", .values = {4, -4}};
+  View view = {.colouring = Colouring::kField, .field = &field, .is_field_of_simplices = true};
+  const absl::StatusOr<Scene> scene = MakeScene(TwoRegions().View(), view);
+  ASSERT_TRUE(scene.ok()) << scene.status();
+  EXPECT_EQ(scene->low, -4);
+  EXPECT_EQ(scene->facets[0].share, 1);
+  EXPECT_EQ(scene->facets[1].share, 0);
+  field.values.push_back(0);
+  EXPECT_THAT(std::string(MakeScene(TwoRegions().View(), view).status().message()),
+              HasSubstr("expected a value of pressure for each of the 2 simplices, got 3"));
+  // In space a facet has the number of its tetrahedron.
+  const formats::Mesh cube = Cubes(1);
+  field.values.assign(cube.View().simplex_count(), 0);
+  field.values[0] = 1;
+  view.only_boundary = true;
+  const absl::StatusOr<Scene> cut = MakeScene(cube.View(), view);
+  ASSERT_TRUE(cut.ok()) << cut.status();
+  for (const Facet& facet : cut->facets) {
+    EXPECT_TRUE(facet.share == 0 || facet.share == 1) << facet.share;
+  }
+}
+
 TEST(SceneTest, AFieldHasValues) {
-  const formats::PointAttribute one = {.name = "one", .values = std::vector<double>(4, 7.5)};
+  const formats::Attribute one = {.name = "one", .values = std::vector<double>(4, 7.5)};
   const absl::StatusOr<Scene> scene = MakeScene(Square().View(), {.colouring = Colouring::kField, .field = &one});
   ASSERT_TRUE(scene.ok()) << scene.status();
   EXPECT_EQ(scene->facets[0].share, 0.5);
-  const formats::PointAttribute none = {.name = "none",
-                                        .values = std::vector<double>(4, std::numeric_limits<double>::infinity())};
+  const formats::Attribute none = {.name = "none",
+                                   .values = std::vector<double>(4, std::numeric_limits<double>::infinity())};
   EXPECT_THAT(
       std::string(MakeScene(Square().View(), {.colouring = Colouring::kField, .field = &none}).status().message()),
       HasSubstr("no vertex has a finite value of none"));
-  const formats::PointAttribute few = {.name = "few", .values = {1, 2, 3}};
+  const formats::Attribute few = {.name = "few", .values = {1, 2, 3}};
   EXPECT_THAT(
       std::string(MakeScene(Square().View(), {.colouring = Colouring::kField, .field = &few}).status().message()),
       HasSubstr("expected a value of few for each of the 4 vertices, got 3"));

@@ -33,7 +33,7 @@ TEST_F(AttributeFilesTest, NamedColumnsOfNumbersInTables) {
   const PointCloud cloud = ReadGood("a.csv", csv, {.skip_invalid = true, .keep_attributes = true});
   EXPECT_THAT(cloud.points, ElementsAre(1, 2, 3, 4, 7, 8));
   ASSERT_EQ(cloud.attributes.size(), 2);  // names are words, and a column without a name is none
-  EXPECT_EQ(cloud.attributes[0], (PointAttribute{"id", {7, 8, 10}}));
+  EXPECT_EQ(cloud.attributes[0], (Attribute{"id", {7, 8, 10}}));
   EXPECT_EQ(cloud.attributes[1].name, "heat");
   EXPECT_THAT(cloud.attributes[1].values, Values({0.5, kMissing, kMissing}));
   EXPECT_THAT(ReadGood("a.csv", csv, {.skip_invalid = true}).attributes, IsEmpty());
@@ -49,18 +49,18 @@ TEST_F(AttributeFilesTest, PropertiesOfPly) {
       ReadGood("a.ply", "ply\nformat ascii 1.0\n" + header + "255 2 1 7 1 -5\n0 4 0 3 what\n", kWithAttributes);
   EXPECT_THAT(text.points, ElementsAre(1, 2, 3, 4));
   ASSERT_EQ(text.attributes.size(), 2);
-  EXPECT_EQ(text.attributes[0], (PointAttribute{"red", {255, 0}}));
+  EXPECT_EQ(text.attributes[0], (Attribute{"red", {255, 0}}));
   EXPECT_THAT(text.attributes[1].values, Values({-5, kMissing}));
   using std::string_literals::operator""s;
   const std::string row = "\xff\0\0\0\x40\0"s + "\0\0\0\0\0\0\xf0\x3f"s + "\xfb\xff"s;
   const PointCloud binary =
       ReadGood("a.ply", "ply\nformat binary_little_endian 1.0\n" + header + row + row, kWithAttributes);
   EXPECT_THAT(binary.points, ElementsAre(1, 2, 1, 2));
-  EXPECT_THAT(binary.attributes, ElementsAre(PointAttribute{"red", {255, 255}}, PointAttribute{"id", {-5, -5}}));
+  EXPECT_THAT(binary.attributes, ElementsAre(Attribute{"red", {255, 255}}, Attribute{"id", {-5, -5}}));
 }
 
 TEST_F(AttributeFilesTest, NamesOfFiles) {
-  const std::vector<PointAttribute> attributes = {{"origin", {}}, {"", {}}, {"a<b", {}}, {"a_b", {}}, {"x y", {}}};
+  const std::vector<Attribute> attributes = {{"origin", {}}, {"", {}}, {"a<b", {}}, {"a_b", {}}, {"x y", {}}};
   EXPECT_THAT(NamesToWrite(attributes), ElementsAre("origin_", "attribute", "a_b", "a_b_", "x y"));
 }
 
@@ -68,7 +68,7 @@ TEST_F(AttributeFilesTest, NamesOfFiles) {
 TEST_F(AttributeFilesTest, ComeBackFromVtuAndVtk) {
   const std::vector<double> points = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
   const std::vector<uint32_t> simplices = {0, 1, 2, 3};
-  const std::vector<PointAttribute> attributes = {{"heat %", {0.1, 2, kMissing, -4}}, {"id", {1, 2, 3, 4}}};
+  const std::vector<Attribute> attributes = {{"heat %", {0.1, 2, kMissing, -4}}, {"id", {1, 2, 3, 4}}};
   MeshView mesh{.dimension = 3, .points = points, .simplices = simplices};
   mesh.attributes = attributes;
   for (const char* name : {"a.vtu", "a.vtk"}) {
@@ -79,7 +79,7 @@ TEST_F(AttributeFilesTest, ComeBackFromVtuAndVtk) {
     ASSERT_TRUE(cloud.ok()) << cloud.status();
     EXPECT_EQ(cloud->points, points);
     ASSERT_EQ(cloud->attributes.size(), 3);
-    EXPECT_EQ(cloud->attributes[0], (PointAttribute{"input", {0, 0, 0, 0}}));
+    EXPECT_EQ(cloud->attributes[0], (Attribute{"input", {0, 0, 0, 0}}));
     EXPECT_EQ(cloud->attributes[1].name, "heat %");
     EXPECT_THAT(cloud->attributes[1].values, Values(attributes[0].values));
     EXPECT_EQ(cloud->attributes[2], attributes[1]);
@@ -89,7 +89,7 @@ TEST_F(AttributeFilesTest, ComeBackFromVtuAndVtk) {
 TEST_F(AttributeFilesTest, OtherFormatsLeaveThemOutAndMissingValuesAreAnError) {
   const std::vector<double> points = {0, 0, 1, 0, 0, 1};
   const std::vector<uint32_t> simplices = {0, 1, 2};
-  std::vector<PointAttribute> attributes = {{"heat", {1, 2, 3}}};
+  std::vector<Attribute> attributes = {{"heat", {1, 2, 3}}};
   MeshView mesh{.dimension = 2, .points = points, .simplices = simplices};
   mesh.attributes = attributes;
   for (const char* name : {"a.msh", "a.mesh", "a.node", "a.su2", "a.inp"}) {

@@ -178,7 +178,7 @@ TEST_F(EveryPairTest, LossesAreToldOf) {
                           HasSubstr("names are labels")));
   EXPECT_THAT(WriteNoted(mesh, {"vtkhdf", "a.vtkhdf"}), IsEmpty());
   EXPECT_THAT(WriteNoted(mesh, {"xdmf", "a.xdmf"}), IsEmpty());
-  const std::vector<PointAttribute> attributes = {{"heat", std::vector<double>(60, 1.5)}};
+  const std::vector<Attribute> attributes = {{"heat", std::vector<double>(60, 1.5)}};
   for (const char* format : {"msh41", "msh22", "medit", "node", "su2", "abaqus"}) {
     SCOPED_TRACE(format);
     Mesh plain = RandomMesh(2, 60, 1);

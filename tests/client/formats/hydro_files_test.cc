@@ -65,7 +65,7 @@ TEST_F(HydroFilesTest, AdcircAsItsProgramsWriteIt) {
               ElementsAre(BoundaryPart{1, "open", 1}, BoundaryPart{2, "land 0", 3}, BoundaryPart{3, "island 21", 4}));
   EXPECT_THAT(read.mesh.facets, ElementsAre(3, 0, 0, 1, 1, 2, 2, 3, 4, 7, 7, 6, 6, 5, 5, 4));
   ASSERT_EQ(read.attributes.size(), 1);
-  EXPECT_EQ(read.attributes[0], (PointAttribute{"depth", {5, 5.5, 10, -1, 2, 2, 2, 2}}));
+  EXPECT_EQ(read.attributes[0], (Attribute{"depth", {5, 5.5, 10, -1, 2, 2, 2, 2}}));
   EXPECT_THAT(read.notes, IsEmpty());
 
   // There and back: tags, names, depths and the types of boundaries.
@@ -150,7 +150,7 @@ TEST_F(HydroFilesTest, MeshOf2dm) {
   EXPECT_THAT(read.mesh.simplex_regions, ElementsAre(7, 5));
   EXPECT_THAT(read.mesh.boundary, ElementsAre(BoundaryPart{1, "", 2}, BoundaryPart{12, "", 2}));
   EXPECT_THAT(read.mesh.facets, ElementsAre(0, 1, 1, 2, 2, 3, 3, 0));
-  EXPECT_EQ(read.attributes[0], (PointAttribute{"elevation", {1.5, -2, 0, 0}}));
+  EXPECT_EQ(read.attributes[0], (Attribute{"elevation", {1.5, -2, 0, 0}}));
   std::vector<std::string> notes;
   ASSERT_TRUE(WriteMesh(folder_.Path("b.2dm"), "", read.View(), {}, &notes).ok());
   EXPECT_THAT(notes, IsEmpty());
@@ -192,7 +192,7 @@ TEST_F(HydroFilesTest, HeightsThatAreMissingAreTold) {
   ASSERT_TRUE(WriteMesh(folder_.Path("a.14"), "", mesh.View(), {}, &notes).ok());
   EXPECT_THAT(notes, ElementsAre(HasSubstr("is called depth or elevation: all nodes have the depth 0")));
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  const std::vector<PointAttribute> attributes = {{"heat", {1, 2, 3, 4}}, {"depth", {1, nan, 3, nan}}};
+  const std::vector<Attribute> attributes = {{"heat", {1, 2, 3, 4}}, {"depth", {1, nan, 3, nan}}};
   MeshView view = mesh.View();
   view.attributes = attributes;
   notes.clear();

@@ -41,7 +41,7 @@ std::string Replaced(std::string text, const std::string& from, const std::strin
 
 std::vector<std::string> NamesOf(const PointCloud& cloud) {
   std::vector<std::string> names;
-  for (const PointAttribute& attribute : cloud.attributes) {
+  for (const Attribute& attribute : cloud.attributes) {
     names.push_back(attribute.name);
   }
   return names;
@@ -176,7 +176,7 @@ TEST_F(PointFilesTest, PcdInBinary) {
   const std::string file = kBinaryPcdHeader + "binary\n"s + first + second;
   const PointCloud cloud = ReadGood("a.pcd", file, kWithAttributes);
   EXPECT_THAT(cloud.points, ElementsAre(0.5, 0.1, -7, 1.5, 1e300, 9));
-  EXPECT_THAT(cloud.attributes, ElementsAre(PointAttribute{"i", {-2, 300}}));
+  EXPECT_THAT(cloud.attributes, ElementsAre(Attribute{"i", {-2, 300}}));
   EXPECT_THAT(cloud.Origin(1), EndsWith("a.pcd[1]"));
   EXPECT_THAT(ReadBad("a.pcd", file.substr(0, file.size() - 1)),
               HasSubstr("expected 2 points of 21 bytes, as the header says; the file ends in point 1"));
@@ -286,12 +286,12 @@ TEST_F(PointFilesTest, Las12WithTimeAndColour) {
   const std::string file = Las(2, 3, {withheld, record});
   const PointCloud cloud = ReadGood("a.las", file, kWithAttributes);
   EXPECT_THAT(cloud.points, ElementsAre(-1, 1001.25, 2001.5));
-  EXPECT_THAT(cloud.attributes,
-              ElementsAre(PointAttribute{"intensity", {496}}, PointAttribute{"return_number", {2}},
-                          PointAttribute{"number_of_returns", {3}}, PointAttribute{"classification", {6}},
-                          PointAttribute{"scan_angle", {-12}}, PointAttribute{"user_data", {77}},
-                          PointAttribute{"point_source_id", {4242}}, PointAttribute{"gps_time", {123456.75}},
-                          PointAttribute{"red", {65535}}, PointAttribute{"green", {256}}, PointAttribute{"blue", {1}}));
+  EXPECT_THAT(
+      cloud.attributes,
+      ElementsAre(Attribute{"intensity", {496}}, Attribute{"return_number", {2}}, Attribute{"number_of_returns", {3}},
+                  Attribute{"classification", {6}}, Attribute{"scan_angle", {-12}}, Attribute{"user_data", {77}},
+                  Attribute{"point_source_id", {4242}}, Attribute{"gps_time", {123456.75}}, Attribute{"red", {65535}},
+                  Attribute{"green", {256}}, Attribute{"blue", {1}}));
   EXPECT_THAT(cloud.Origin(0), EndsWith("a.las[1]"));
   EXPECT_THAT(cloud.notes, ElementsAre(EndsWith("1 point is left out, which the file marks as withheld")));
   EXPECT_THAT(ReadGood("a.las", file, {.dimension = 2, .columns = {"x", "gps_time"}}).points,
@@ -315,7 +315,7 @@ TEST_F(PointFilesTest, Las14WithInfrared) {
               ElementsAre("intensity", "return_number", "number_of_returns", "classification", "scan_angle",
                           "user_data", "point_source_id", "gps_time", "red", "green", "blue", "nir"));
   std::vector<double> of_first;
-  for (const PointAttribute& attribute : cloud.attributes) {
+  for (const Attribute& attribute : cloud.attributes) {
     of_first.push_back(attribute.values[0]);
   }
   EXPECT_THAT(of_first, ElementsAre(504, 9, 11, 200, -30, 3, 9, 0.5, 0, 0, 11, 12));

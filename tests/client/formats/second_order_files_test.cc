@@ -111,7 +111,7 @@ TEST_F(SecondOrderFilesTest, DataOfVertices) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   constexpr double kMax = std::numeric_limits<double>::max();
   const Mesh mesh{.dimension = 2, .points = {kMax, 0, kMax, 0.5, 0, 1}, .simplices = {0, 1, 2}, .weights = {1, 2, 4}};
-  const std::vector<PointAttribute> attributes = {{"depth", {1, 3, kNan}}, {"id", {0, 1, 2}}};
+  const std::vector<Attribute> attributes = {{"depth", {1, 3, kNan}}, {"id", {0, 1, 2}}};
   MeshView view = mesh.View();
   view.attributes = attributes;
   view.input_vertices = 2;
@@ -120,7 +120,7 @@ TEST_F(SecondOrderFilesTest, DataOfVertices) {
   ASSERT_TRUE(points.ok()) << points.status();
   EXPECT_EQ(Bits(points->points), Bits({kMax, 0, kMax, 0.5, 0, 1, kMax, 0.25, kMax / 2, 0.5, kMax / 2, 0.75}));
   std::vector<std::string> names;
-  for (const PointAttribute& attribute : points->attributes) {
+  for (const Attribute& attribute : points->attributes) {
     names.push_back(attribute.name);
     if (attribute.name == "depth") {
       EXPECT_EQ(std::vector<double>(attribute.values.begin(), attribute.values.begin() + 2),
@@ -145,7 +145,7 @@ TEST_F(SecondOrderFilesTest, OriginsAndTagsOfMiddles) {
   const absl::StatusOr<PointCloud> points = ReadCloud(folder_.Path("a.vtk"), {.keep_attributes = true});
   ASSERT_TRUE(points.ok()) << points.status();
   bool has_both = false;
-  for (const PointAttribute& attribute : points->attributes) {
+  for (const Attribute& attribute : points->attributes) {
     if (attribute.name == "origin") {
       EXPECT_EQ(attribute.values, (std::vector<double>{0, 1, -1, -3, -4, -4, -4, -4, -4}));
     } else if (attribute.name == "boundary") {
@@ -209,7 +209,7 @@ TEST_F(SecondOrderFilesTest, AWriterStopsBeforeItsEnd) {
 TEST_F(SecondOrderFilesTest, WhatHasNoPlaceIsTold) {
   Mesh mesh = Tetrahedron();
   mesh.ridges = {1, 2};
-  const std::vector<PointAttribute> attributes = {{"heat", {1, 2, 3, 4}}};
+  const std::vector<Attribute> attributes = {{"heat", {1, 2, 3, 4}}};
   MeshView view = mesh.View();
   view.attributes = attributes;
   ASSERT_TRUE(WriteSecond(view, "a.msh").ok());

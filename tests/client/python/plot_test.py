@@ -1,5 +1,6 @@
 """Pages of meshes: the same as the tool's, in notebooks and files, whatever names say."""
 
+import base64
 import html
 import json
 import pathlib
@@ -20,6 +21,10 @@ HOSTILE = "</script><script>alert(1)</script><!-- \udc80 é \x7f\n\"'&"
 
 def header_of(page):
     return json.loads(re.search(r'id="mesh">(.*?)</script>', page)[1])
+
+
+def array_of(page, element):
+    return np.frombuffer(base64.b64decode(re.search(rf'id="mesh-{element}">(.*?)</script>', page)[1]))
 
 
 class PlotTest(Case):
@@ -76,11 +81,14 @@ class PlotTest(Case):
 
     def test_files_and_data(self):
         mesh = wellspace.mesh(uniform(30, 2))
-        plot = mesh.plot(data={"x": mesh.points[:, 0], HOSTILE: np.arange(len(mesh.points))})
+        areas = np.arange(len(mesh.simplices)) / 7
+        plot = mesh.plot(data={"x": mesh.points[:, 0], "area": areas, HOSTILE: np.arange(len(mesh.points))})
         plot.save(self.folder / "page.html")
         text = (self.folder / "page.html").read_text(encoding="utf-8")
         self.assertEqual(text, plot.html)
         self.assertEqual(header_of(text)["fields"], ["x", HOSTILE])
+        self.assertEqual(header_of(text)["simplex_fields"], ["area"])
+        np.testing.assert_array_equal(array_of(text, "simplex-field0"), areas)
         self.assertEqual([path.name for path in self.folder.iterdir()], ["page.html"])
         with self.assertRaises(FileNotFoundError):
             plot.save(self.folder / "absent" / "page.html")

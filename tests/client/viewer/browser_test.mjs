@@ -278,6 +278,27 @@ test("what has no number has no colour", async () => {
   });
 });
 
+test("data of cells have colours, histogram and rows", async () => {
+  const mesh = (path) =>
+    writeFileSync(
+      path,
+      "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 5 double\n" +
+        "0 0 0 1 0 0 0 1 0 0 0 1 1 1 1\nCELLS 3 14\n4 0 1 2 3\n3 0 1 2\n4 1 2 3 4\nCELL_TYPES 3\n10\n5\n10\n" +
+        "CELL_DATA 3\nSCALARS pressure double 1\nLOOKUP_TABLE default\n1.5\n99\n-2\n" +
+        "VECTORS velocity double\n1 2 3\n0 0 0\n4 5 6\n",
+    );
+  await open(pageOf("cells.vtk", mesh), async (page) => {
+    const names = await page.locator("#colour optgroup[label=Data] option").allInnerTexts();
+    assert.deepEqual(names, ["pressure", "velocity:0", "velocity:1", "velocity:2"]);
+    await page.selectOption("#colour", "simplex-field0");
+    assert.ok((await picture(page)).saturated > 0);
+    assert.match(await text(page, "#low"), /^[-−]2$/);
+    assert.equal(await text(page, "#high"), "1.5"); // the triangle's 99 is no simplex's
+    await page.locator("#worst button").first().click();
+    assert.match(await text(page, "#chosen"), /pressure\s+(1\.5|-2|−2)/);
+  });
+});
+
 test("keys turn and zoom; the address has the camera", async () => {
   await open(spot(), async (page) => {
     await page.locator("#canvas").focus();

@@ -67,22 +67,27 @@ std::vector<T> ArrayOf(const std::string& page, const std::string& id) {
 
 TEST_F(PageTest, HasTheMesh) {
   const formats::Mesh mesh = TwoTetrahedra();
-  const std::vector<formats::PointAttribute> attributes = {{"height", {0, -1.5, 1e-320, 3, 4}}};
+  const std::vector<formats::Attribute> attributes = {{"height", {0, -1.5, 1e-320, 3, 4}}};
   formats::MeshView view = mesh.View();
   view.attributes = attributes;
+  const std::vector<formats::Attribute> simplex_attributes = {{"pressure", {2.5, -0.0}}};
+  view.simplex_attributes = simplex_attributes;
   const std::vector<double> weights = {1, 2, 3, 4, 5};
   view.weights = weights;
   const std::string page = PageOf(view, {.name = "a.npz", .up = 1});
-  EXPECT_EQ(ElementOf(page, "mesh"),
-            R"({"boundary":[{"facets":2,"name":"bottom","tag":-4},{"facets":1,"name":"","tag":7}],)"
-            R"("dimension":3,"fields":["height","weights"],"format":1,"has_simplex_regions":true,"name":"a.npz",)"
-            R"("regions":[{"id":-2,"name":"rock"},{"id":9,"name":"water"}],"simplices":2,"up":1,"vertices":5})");
+  EXPECT_EQ(
+      ElementOf(page, "mesh"),
+      R"({"boundary":[{"facets":2,"name":"bottom","tag":-4},{"facets":1,"name":"","tag":7}],)"
+      R"("dimension":3,"fields":["height","weights"],"format":1,"has_simplex_regions":true,"name":"a.npz",)"
+      R"("regions":[{"id":-2,"name":"rock"},{"id":9,"name":"water"}],"simplex_fields":["pressure"],"simplices":2,)"
+      R"("up":1,"vertices":5})");
   EXPECT_EQ(ArrayOf<double>(page, "mesh-points"), mesh.points);
   EXPECT_EQ(ArrayOf<uint32_t>(page, "mesh-simplices"), mesh.simplices);
   EXPECT_EQ(ArrayOf<uint32_t>(page, "mesh-facets"), mesh.facets);
   EXPECT_EQ(ArrayOf<uint32_t>(page, "mesh-regions"), (std::vector<uint32_t>{1, 0}));
   EXPECT_EQ(ArrayOf<double>(page, "mesh-field0"), attributes[0].values);
   EXPECT_EQ(ArrayOf<double>(page, "mesh-field1"), weights);
+  EXPECT_EQ(ArrayOf<double>(page, "mesh-simplex-field0"), simplex_attributes[0].values);
 }
 
 // Larger than one piece of the output.
@@ -106,7 +111,7 @@ TEST_F(PageTest, NamesAreNeverMarkup) {
   const std::string hostile = "</script><script>alert(1)</script><!--\xff\xe2\x82\n\x7f\"'&";
   mesh.boundary[0].name = hostile;
   mesh.regions[0].name = hostile;
-  const std::vector<formats::PointAttribute> attributes = {{hostile, {0, 1, 2, 3, 4}}};
+  const std::vector<formats::Attribute> attributes = {{hostile, {0, 1, 2, 3, 4}}};
   formats::MeshView view = mesh.View();
   view.attributes = attributes;
   const std::string page = PageOf(view, {.name = hostile});

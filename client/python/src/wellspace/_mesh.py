@@ -264,8 +264,9 @@ class Mesh(MeshArrays):
             The mesh's name on the page.
         up : str
             The axis that points upwards at first: ``"x"``, ``"y"`` or ``"z"``.
-        data : dict of str to (n,) array
-            Numbers of the vertices, by their names: the page can colour by them. NaN stands for none.
+        data : dict of str to (n,) or (m,) array
+            Numbers of the n vertices or of the m simplices, by their names: the page can colour by them. NaN stands for
+            none. Where n is m, they are of the vertices.
         height : int
             In the notebook, in pixels.
 

@@ -66,21 +66,28 @@ def plot(mesh: MeshArrays, name: str, up: str, data: Mapping[str, Any] | None, h
         raise InvalidArgumentError("a mesh without simplices; plot wants one at least", field="mesh")
     page = importlib.resources.files(__package__).joinpath("viewer.html").read_text(encoding="utf-8")
     before, after = page.split(_MARK)
-    return Plot([before, *_elements(mesh, name, up, _fields(mesh, data or {})), after], name, height)
+    return Plot([before, *_elements(mesh, name, up, *_fields(mesh, data or {})), after], name, height)
 
 
-def _fields(mesh: MeshArrays, data: Mapping[str, Any]) -> dict[str, npt.NDArray[np.float64]]:
-    """The numbers of the vertices."""
-    fields = {}
+_Fields = dict[str, npt.NDArray[np.float64]]
+
+
+def _fields(mesh: MeshArrays, data: Mapping[str, Any]) -> tuple[_Fields, _Fields]:
+    """The numbers of the vertices, and those of the simplices."""
+    of_vertices: _Fields = {}
+    of_simplices: _Fields = {}
     for name, values in data.items():
         array = np.asarray(values, np.float64)
-        if array.shape != (len(mesh.points),):
-            expected = f"({len(mesh.points)},), one number for each vertex"
+        if array.shape == (len(mesh.points),):
+            of_vertices[str(name)] = array
+        elif array.shape == (len(mesh.simplices),):
+            of_simplices[str(name)] = array
+        else:
+            expected = f"({len(mesh.points)},) or ({len(mesh.simplices)},), one number for each vertex or simplex"
             raise InvalidArgumentError(f"data[{name!r}] has the shape {array.shape}; expected {expected}", field="data")
-        fields[str(name)] = array
     if mesh.weights is not None:
-        fields.setdefault("weights", mesh.weights)
-    return fields
+        of_vertices.setdefault("weights", mesh.weights)
+    return of_vertices, of_simplices
 
 
 def _facet_counts(mesh: MeshArrays) -> dict[int, int]:
@@ -91,7 +98,7 @@ def _facet_counts(mesh: MeshArrays) -> dict[int, int]:
 
 
 def _elements(
-    mesh: MeshArrays, name: str, up: str, fields: dict[str, npt.NDArray[np.float64]]
+    mesh: MeshArrays, name: str, up: str, of_vertices: _Fields, of_simplices: _Fields
 ) -> Iterator[str]:
     """The elements of the page that hold the mesh; docs/view.md defines them."""
     counts = _facet_counts(mesh)
@@ -107,7 +114,8 @@ def _elements(
         "boundary": [{"tag": tag, "name": mesh.facet_names.get(tag, ""), "facets": counts[tag]} for tag in counts],
         "regions": [{"id": number, "name": mesh.region_names.get(number, "")} for number in ids],
         "has_simplex_regions": len(ids) > 1,
-        "fields": list(fields),
+        "fields": list(of_vertices),
+        "simplex_fields": list(of_simplices),
     }
     text = json.dumps(header, sort_keys=True, separators=(",", ":")).replace("<", "\\u003c")
     yield f'<script type="application/json" id="mesh">{text}</script>\n'
@@ -118,8 +126,9 @@ def _elements(
     }
     if len(ids) > 1:
         arrays["regions"] = np.searchsorted(ids, mesh.regions).astype("<u4")
-    for number, values in enumerate(fields.values()):
-        arrays[f"field{number}"] = values.astype("<f8", copy=False)
+    for kind, fields in (("field", of_vertices), ("simplex-field", of_simplices)):
+        for number, values in enumerate(fields.values()):
+            arrays[f"{kind}{number}"] = values.astype("<f8", copy=False)
     for key, array in arrays.items():
         if array.nbytes > _MOST_BYTES:
             raise LimitError(f"the {key} take {array.nbytes} bytes; a page has room for {_MOST_BYTES} of an array")

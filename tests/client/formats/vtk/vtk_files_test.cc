@@ -147,7 +147,7 @@ TEST_F(VtkFilesTest, AppendedDataOfEveryKind) {
     const MeshOrCloud read = ReadEither("a.vtu");
     EXPECT_THAT(read.notes, IsEmpty());
     ASSERT_EQ(read.attributes.size(), 1);
-    EXPECT_EQ(read.attributes[0], (PointAttribute{"h", {0.1, 0.2, 0.3, 0.4}}));
+    EXPECT_EQ(read.attributes[0], (Attribute{"h", {0.1, 0.2, 0.3, 0.4}}));
   }
 }
 
@@ -213,6 +213,65 @@ TEST_F(VtkFilesTest, PiecesFollowOneAnother) {
   // A vertex of another piece is none.
   folder_.Write("a.vtu", file(first + Piece("5 0 0 6 0 0 5 1 0", "2 0 3", "9")));
   EXPECT_THAT(ReadBad("a.vtu"), HasSubstr("cell 1: expected vertices from 0 to below 3, got 3"));
+}
+
+// Data of a cell with a triangle between those of two tetrahedra, in two pieces.
+TEST_F(VtkFilesTest, DataOfCellsAreThoseOfSimplices) {
+  const auto piece = [](const std::string& data, const char* type = "Float32") {
+    return std::string("<Piece NumberOfPoints=\"5\" NumberOfCells=\"3\"><CellData><DataArray type=\"") + type +
+           "\" Name=\"u\" NumberOfComponents=\"2\" format=\"ascii\">" + data +
+           "</DataArray><DataArray type=\"String\" Name=\"title\" format=\"ascii\">97</DataArray></CellData><Points>"
+           "<DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">0 0 0 1 0 0 0 1 0 0 0 1 1 1 1"
+           "</DataArray></Points><Cells><DataArray type=\"Int64\" Name=\"connectivity\" format=\"ascii\">"
+           "0 1 2 3 0 1 2 1 2 3 4</DataArray><DataArray type=\"Int64\" Name=\"offsets\" format=\"ascii\">4 7 11"
+           "</DataArray><DataArray type=\"UInt8\" Name=\"types\" format=\"ascii\">10 5 10</DataArray></Cells></Piece>";
+  };
+  const auto write = [&](const std::string& pieces) {
+    folder_.Write("a.vtu",
+                  "<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid>" + pieces + "</UnstructuredGrid></VTKFile>");
+  };
+  write(piece("1 2 3 4 5 6") + piece("7 nan 9 10 11 12"));
+  const MeshOrCloud read = ReadEither("a.vtu");
+  ASSERT_EQ(read.View().simplex_attributes.size(), 2);
+  const Attribute& first = read.View().simplex_attributes[0];
+  EXPECT_EQ(first.name, "u:0");
+  EXPECT_THAT(first.values, ElementsAre(1, 5, 7, 11));
+  const Attribute& second = read.View().simplex_attributes[1];
+  EXPECT_EQ(second.name, "u:1");
+  EXPECT_THAT(second.values, ElementsAre(2, 6, ::testing::IsNan(), 12));
+  EXPECT_THAT(ReadGood("a.vtu").simplex_attributes, IsEmpty()) << "they are not asked for";
+  // Of the second piece alone, or with a number too few.
+  for (const std::string& numbers : {std::string("1 2 3 4 5"), std::string()}) {
+    write(piece("1 2 3 4 5 6") + piece(numbers));
+    const absl::StatusOr<Mesh> bad = ReadMesh(folder_.Path("a.vtu"), SimplexData::kKeep);
+    EXPECT_THAT(std::string(bad.status().message()), HasSubstr("expected 2 values of \"u\" for each of 6 cells, got"));
+    EXPECT_TRUE(ReadMesh(folder_.Path("a.vtu")).ok());
+  }
+}
+
+TEST_F(VtkFilesTest, DataOfCellsOfLegacyFilesAndPolygons) {
+  folder_.Write("a.vtk",
+                "# vtk DataFile Version 2.0\nsquare\nASCII\nDATASET POLYDATA\nPOINTS 4 float\n0 0 0 1 0 0 1 1 0 0 1 0\n"
+                "LINES 1 3\n2 0 1\nPOLYGONS 2 8 3 0 1 2 3 0 2 3 CELL_DATA 3 SCALARS region int\nLOOKUP_TABLE t 9 3 4\n"
+                "VECTORS flow double 1 2 3 4 5 6 7 8 9 SCALARS heat double 1 LOOKUP_TABLE default 0.5 1.5 2.5\n");
+  const MeshOrCloud legacy = ReadEither("a.vtk");
+  ASSERT_EQ(legacy.mesh.simplex_attributes.size(), 4);
+  EXPECT_EQ(legacy.mesh.simplex_attributes[1].name, "flow:1");
+  EXPECT_THAT(legacy.mesh.simplex_attributes[1].values, ElementsAre(5, 8));
+  EXPECT_EQ(legacy.mesh.simplex_attributes[3].name, "heat");
+  EXPECT_THAT(legacy.mesh.simplex_attributes[3].values, ElementsAre(1.5, 2.5));
+  folder_.Write("a.vtp",
+                "<VTKFile type=\"PolyData\"><PolyData><Piece NumberOfPoints=\"4\" NumberOfVerts=\"1\" "
+                "NumberOfPolys=\"1\"><CellData><DataArray type=\"Int8\" Name=\"k\" format=\"ascii\">5 6</DataArray>"
+                "</CellData><Points><DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">"
+                "0 0 0 1 0 0 1 1 0 0 1 0</DataArray></Points><Verts><DataArray type=\"Int64\" Name=\"connectivity\" "
+                "format=\"ascii\">3</DataArray><DataArray type=\"Int64\" Name=\"offsets\" format=\"ascii\">1"
+                "</DataArray></Verts><Polys><DataArray type=\"Int64\" Name=\"connectivity\" format=\"ascii\">0 1 2"
+                "</DataArray><DataArray type=\"Int64\" Name=\"offsets\" format=\"ascii\">3</DataArray></Polys></Piece>"
+                "</PolyData></VTKFile>");
+  const MeshOrCloud polygons = ReadEither("a.vtp");
+  ASSERT_EQ(polygons.mesh.simplex_attributes.size(), 1);
+  EXPECT_THAT(polygons.mesh.simplex_attributes[0].values, ElementsAre(6));
 }
 
 constexpr char kLegacySquare[] =
