@@ -74,6 +74,12 @@ PagePool& PagePool::Shared() {
   return *pool;
 }
 
+PagePool::~PagePool() {
+  if (spare_ != nullptr) {
+    UnmapHugePages(spare_, kHugePage);
+  }
+}
+
 void* PagePool::Take(size_t bytes) {
   const size_t count = (bytes + kSmallPage - 1) / kSmallPage;
   const std::lock_guard lock(mutex_);
@@ -82,6 +88,7 @@ void* PagePool::Take(size_t bytes) {
   if (at == large_pages_.end()) {
     at = large_pages_.try_emplace(static_cast<std::byte*>(MapHugePages(kHugePage))).first;
   }
+  spare_ = spare_ == at->first ? nullptr : spare_;
   return at->first + at->second.Take(count) * kSmallPage;
 }
 
@@ -90,10 +97,15 @@ void PagePool::GiveBack(void* memory, size_t bytes) {
   const std::lock_guard lock(mutex_);
   const auto at = std::prev(large_pages_.upper_bound(begin));
   at->second.GiveBack((begin - at->first) / kSmallPage, (bytes + kSmallPage - 1) / kSmallPage);
-  if (at->second.AllFree()) {
-    UnmapHugePages(at->first, kHugePage);
-    large_pages_.erase(at);
+  if (!at->second.AllFree()) {
+    return;
   }
+  if (spare_ == nullptr) {
+    spare_ = at->first;
+    return;
+  }
+  UnmapHugePages(at->first, kHugePage);
+  large_pages_.erase(at);
 }
 
 size_t PagePool::Pages::Take(size_t count) {

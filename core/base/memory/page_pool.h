@@ -21,13 +21,20 @@ void* MapHugePages(size_t bytes);
 void UnmapHugePages(void* memory, size_t bytes);
 
 // Arrays smaller than a large page, in runs of small ones: the first by address that is free. Large pages are mapped as
-// they are needed; one on which nothing is left is the system's at once.
+// they are needed. One on which nothing is left is kept for the next array: the system would clear it anew, which takes
+// as long as a mesh of ten points. A second one is the system's at once.
 //
 // Thread safety: thread-safe.
 class PagePool {
  public:
   // The pool that all share; it is never destroyed.
   static PagePool& Shared();
+
+  PagePool() = default;
+  // REQUIRES:   all that was taken is given back.
+  ~PagePool();
+  PagePool(const PagePool&) = delete;
+  PagePool& operator=(const PagePool&) = delete;
 
   // Memory that begins at a page. Its contents are not known. Throws std::bad_alloc if the system has none.
   //
@@ -60,7 +67,9 @@ class PagePool {
   };
 
   std::mutex mutex_;
+  // Guarded by mutex_.
   std::map<std::byte*, Pages> large_pages_;
+  std::byte* spare_ = nullptr;  // that of these on which nothing is
 };
 
 }  // namespace wellspace::core

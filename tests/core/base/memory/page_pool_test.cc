@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <optional>
 #include <random>
 #include <thread>
 #include <utility>
@@ -57,19 +58,26 @@ TEST(PagePoolTest, TheFirstRunThatIsLongEnoughIsTaken) {
   EXPECT_EQ(Take(pool, kPage), runs[3] + 3 * kPage);
 }
 
-TEST(PagePoolTest, ALargePageGoesWithTheLastOnIt) {
-  PagePool pool;
-  std::byte* const first = Take(pool, kHugePage / 2);
-  std::byte* const second = Take(pool, kHugePage / 2);
-  std::byte* const third = Take(pool, kHugePage);
+TEST(PagePoolTest, ALargePageGoesWithTheLastOnItButOne) {
+  std::optional<PagePool> pool(std::in_place);
+  std::byte* const first = Take(*pool, kHugePage / 2);
+  std::byte* const second = Take(*pool, kHugePage / 2);
+  std::byte* const third = Take(*pool, kHugePage);
   second[kHugePage / 2 - 1] = third[0] = std::byte{1};
-  pool.GiveBack(first, kHugePage / 2);
+  pool->GiveBack(first, kHugePage / 2);
   EXPECT_TRUE(test::IsMapped(second));
-  pool.GiveBack(second, kHugePage / 2);
-  EXPECT_FALSE(test::IsMapped(first));
-  EXPECT_TRUE(test::IsMapped(third));
-  pool.GiveBack(third, kHugePage);
+  pool->GiveBack(second, kHugePage / 2);
+  EXPECT_TRUE(test::IsMapped(first)) << "for the next array";
+  pool->GiveBack(third, kHugePage);
   EXPECT_FALSE(test::IsMapped(third));
+  EXPECT_EQ(Take(*pool, kHugePage), first);
+  std::byte* const fourth = Take(*pool, kHugePage);
+  pool->GiveBack(fourth, kHugePage);
+  EXPECT_TRUE(test::IsMapped(fourth)) << "nothing else is free now";
+  pool->GiveBack(first, kHugePage);
+  EXPECT_FALSE(test::IsMapped(first));
+  pool.reset();
+  EXPECT_FALSE(test::IsMapped(fourth));
 }
 
 // Takes and gives back at random; a run that was taken holds the bytes written to it.
