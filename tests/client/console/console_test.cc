@@ -22,8 +22,11 @@
 #include "client/console/http_server.h"
 #include "client/formats/io/input_file.h"
 #include "client/formats/io/zip_file.h"
+#include "client/retry_policy.h"
+#include "grpcpp/grpcpp.h"
 #include "server/embedded_server.h"
 #include "tests/support/temporary_folder.h"
+#include "wellspace/v1/meshing.grpc.pb.h"
 
 namespace wellspace::console {
 namespace {
@@ -110,6 +113,31 @@ class ConsoleTest : public ::testing::Test {
   Console console_;
   const std::unique_ptr<HttpServer> http_;
 };
+
+// A server behind a proxy that passes this service alone.
+class WithoutHealth final : public v1::MeshingService::Service {
+  grpc::Status GetServerInfo(grpc::ServerContext* /*context*/, const v1::GetServerInfoRequest* /*request*/,
+                             v1::GetServerInfoResponse* response) override {
+    response->set_version("7.7");
+    return grpc::Status::OK;
+  }
+};
+
+TEST(ConsoleOfAProxy, ShowsTheServerWhoseHealthIsUnknown) {
+  WithoutHealth service;
+  grpc::ServerBuilder builder;
+  const std::unique_ptr<grpc::Server> server = builder.RegisterService(&service).BuildAndStart();
+  const TemporaryFolder folder;
+  client::RetryPolicy once;
+  once.max_attempts = 1;
+  Console console(client::Client(client::MakeConnection(server->InProcessChannel({}), once)),
+                  {.folder = folder.Path("")});
+  const HttpAnswer answer = console.Answer({.method = "GET", .path = "api/server"});
+  EXPECT_EQ(answer.status, 200) << answer.body;
+  const json figures = json::parse(answer.body);
+  EXPECT_EQ(figures["health"], "unknown");
+  EXPECT_EQ(figures["info"]["version"], "7.7");
+}
 
 TEST_F(ConsoleTest, ThePageIsServedWithStrictRules) {
   const Answer page = Ask("GET", "");
