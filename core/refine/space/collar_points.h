@@ -14,6 +14,11 @@ namespace wellspace::core {
 // Collar points are so many times the lesser of two spacings away: the ball over a subsegment does not reach them.
 inline constexpr double kCollarShare = 0.6;
 
+// The collar points of a vertex on different patches are shifted along the curve against each other by this share of
+// the lesser spacing, at most. Else two and two beside neighbours on the curve are a trapezoid, so on a circle; and
+// where the curve bends it is not quite flat, and thin tetrahedra would be in it.
+inline constexpr double kShiftShare = 0.1;
+
 // The patches at a point of a curve, in the order of the sides of triangles there, and the ways into them, which are
 // across the curve.
 struct SidesAtPoint {

@@ -30,6 +30,13 @@ constexpr double kOddShare = 0.95;
 // the balls over subsegments.
 constexpr double kLeastShare = 0.54;
 
+// Collar points of a vertex on two patches are shifted against each other by no more than this share of what would
+// bring them into each other's balls.
+constexpr double kShareOfReach = 0.25;
+
+// They are not where the curve turns at one point by more than this share of the angle between two patches.
+constexpr double kShareOfKink = 0.3;
+
 // The ball about the tip of a cone has no larger share of the diagonal.
 constexpr double kShareOfSize = 0.125;
 
@@ -238,9 +245,13 @@ class CreaseSampler {
       WELLSPACE_RETURN_IF_ERROR(CountVertices(order.size()));
       Ring& ring = rings.emplace_back();
       ring.radius = radius;
+      const double shift =
+          ShiftOf(sides, radius, std::min(to_last, to_next), greater, LargestTurn(curve, before, beyond));
+      const std::vector<double> shares = ShiftShares(sides);
       for (const size_t i : order) {
         ring.ways.push_back(sides.ways[i]);
-        ring.collars.push_back(AddCollar(CollarPoint(curve, j, at, radius, sides, i), sides.patches[i]));
+        ring.collars.push_back(
+            AddCollar(CollarPoint(curve, j, at, radius, shares[i] * shift, sides, i), sides.patches[i]));
       }
     }
     for (size_t j = 0; j + 1 < count; ++j) {
@@ -258,16 +269,73 @@ class CreaseSampler {
     return absl::OkStatus();
   }
 
-  // The collar point on side `i` of vertex `j` of an acute curve, at that distance from it: across the curve, but where
-  // the curve leaves the ball of a corner on the sphere of that, as all else is that is put around the corner.
-  Point<3> CollarPoint(uint32_t curve, size_t j, const Point<3>& at, double radius, const SidesAtPoint& sides,
-                       size_t i) const {
+  // The largest turn of a curve at one of its points between two lengths of arc; `from` may be beyond `to` in a loop.
+  // Unit: degrees.
+  double LargestTurn(uint32_t curve, double from, double to) const {
+    if (from > to) {
+      return std::max(LargestTurn(curve, from, domain_.LengthOf(curve)), LargestTurn(curve, 0, to));
+    }
+    const std::span<const double> arcs = domain_.ArcsOf(curve);
+    const std::span<const uint32_t> points = curves().PointsOf(curve);
+    const auto point = [&](size_t i) { return complex().points[points[i]]; };
+    double most = 0;
+    const auto first = static_cast<size_t>(std::lower_bound(arcs.begin(), arcs.end(), from) - arcs.begin());
+    for (size_t i = first; i < arcs.size() && arcs[i] <= to; ++i) {
+      const bool is_inside = i > 0 && i + 1 < arcs.size();
+      if (is_inside || domain_.IsLoop(curve)) {
+        const Point<3> before = point(i > 0 ? i - 1 : arcs.size() - 2);
+        const Point<3> beyond = point(i + 1 < arcs.size() ? i + 1 : 1);
+        most = std::max(most, AngleBetween(Difference<3>(point(i), before), Difference<3>(beyond, point(i))));
+      }
+    }
+    return most;
+  }
+
+  // How far the collar points of a vertex are shifted along the curve against each other, at most. What two patches
+  // have so is out of the diametral balls of each other's strands, also where they are near each other; and the
+  // circumcentres between them stay between them, which they might not where the curve has a kink: there is no shift.
+  static double ShiftOf(const SidesAtPoint& sides, double radius, double lesser, double greater, double turn) {
+    double apart_sq = 4;
+    double angle = 180;
+    for (size_t i = 0; i < sides.ways.size(); ++i) {
+      for (size_t k = 0; k < i; ++k) {
+        apart_sq = std::min(apart_sq, DistanceSq<3>(sides.ways[i], sides.ways[k]));
+        angle = std::min(angle, AngleBetween(sides.ways[i], sides.ways[k]));
+      }
+    }
+    if (!(greater > 0) || turn > kShareOfKink * angle) {
+      return 0;
+    }
+    return std::min(kShiftShare * lesser, kShareOfReach * apart_sq * radius * radius / greater);
+  }
+
+  // The shares of that by side, from 0 to 1: flat patches have the smaller ones, as what is shifted
+  // brings circumcentres nearer to the other patch.
+  std::vector<double> ShiftShares(const SidesAtPoint& sides) const {
+    const size_t count = sides.patches.size();
+    std::vector<size_t> order(count);
+    std::iota(order.begin(), order.end(), size_t{0});
+    std::stable_partition(order.begin(), order.end(), [&](size_t i) { return spacing_.IsFlat(sides.patches[i]); });
+    std::vector<double> shares(count);
+    for (size_t k = 1; k < count; ++k) {
+      shares[order[k]] = static_cast<double>(k) / static_cast<double>(count - 1);
+    }
+    return shares;
+  }
+
+  // The collar point on side `i` of vertex `j` of an acute curve, at that distance from it: across the curve and
+  // shifted along it by so much, but where the curve leaves the ball of a corner on the sphere of that, as all else is
+  // that is put around the corner.
+  Point<3> CollarPoint(uint32_t curve, size_t j, const Point<3>& at, double radius, double shift,
+                       const SidesAtPoint& sides, size_t i) const {
     const bool is_first = j == 0;
     const double ball = is_first                                  ? made_.balls[curve][0]
                         : j + 1 == made_.first_arcs[curve].size() ? made_.balls[curve][1]
                                                                   : 0;
     if (ball == 0) {
-      return PointAcross(domain_, sides, i, at, radius);
+      const Point<3>& along = sides.along;
+      const Point<3> beside = {at[0] + shift * along[0], at[1] + shift * along[1], at[2] + shift * along[2]};
+      return PointAcross(domain_, sides, i, beside, radius);
     }
     const Point<3>& way = sides.ways[i];
     const Point<3> centre = domain_.PointAt(curve, is_first ? 0 : domain_.LengthOf(curve));

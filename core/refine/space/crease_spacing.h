@@ -36,6 +36,11 @@ class CreaseSpacing {
   // Errors:     CANCELLED, DEADLINE_EXCEEDED.
   absl::Status Begin(const std::vector<bool>& is_acute);
 
+  // Whether a patch is flat within what is demanded.
+  //
+  // REQUIRES:   Begin has been called.
+  bool IsFlat(uint32_t patch) const { return bends_.IsFlat(patch); }
+
   // RESOURCE_EXHAUSTED for more vertices than are allowed.
   absl::Status TooManyVertices() const;
 

@@ -27,6 +27,9 @@ class PatchBends {
   // Errors:     CANCELLED, DEADLINE_EXCEEDED.
   absl::Status Begin(double most, const RunContext& context);
 
+  // Whether a patch is, by Begin.
+  bool IsFlat(uint32_t patch) const { return is_flat_[patch]; }
+
   // The largest distance of patches beside an acute curve from facets between it and collar points, if vertices of the
   // curve are `spacing` apart about `arc`; of samples, and 0 where all patches are flat.
   //

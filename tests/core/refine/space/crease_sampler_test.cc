@@ -15,6 +15,7 @@
 
 #include "core/geometry/directions.h"
 #include "core/input/space_cloud.h"
+#include "core/refine/space/collar_points.h"
 #include "core/refine/space/corner_sectors.h"
 #include "tests/support/acute_parts.h"
 #include "tests/support/surfaces.h"
@@ -71,16 +72,27 @@ TEST_F(CreaseSamplerTest, CollarPointsAreAtEqualDistancesOnAllPatches) {
   for (const test::TestSurface& part : {test::Wedge(20), test::AcuteTetrahedron(10), test::Cone(48, 0.5)}) {
     Sample(part, 0.2);
     size_t beside = 0;
+    bool has_shift = false;
     for (const Strand& strand : creases().strands) {
       for (size_t k = 0; k < 2 && strand.curve != Strand::kNoCurve; ++k) {
         const double length = domain().LengthOf(strand.curve);
         const Point<3> at = domain().PointAt(strand.curve, strand.arcs[k]);
-        EXPECT_NEAR(Distance<3>(at, strand.ends[k].at), strand.radii[k], 1e-6 * strand.radii[k]);
+        // Across the curve, and shifted along it on all patches but one; on the sphere of a ball.
+        const Point<3> way = Difference<3>(strand.ends[k].at, at);
+        const double arc = domain().IsLoop(strand.curve) && strand.arcs[k] == length ? 0 : strand.arcs[k];
+        const double shift = Dot<3>(way, SidesAt(domain(), strand.curve, arc).along);
+        const std::vector<double>& arcs = creases().first_arcs[strand.curve];
+        const bool is_on_sphere = (strand.arcs[k] == arcs.front() && creases().balls[strand.curve][0] > 0) ||
+                                  (strand.arcs[k] == arcs.back() && creases().balls[strand.curve][1] > 0);
+        EXPECT_NEAR(std::sqrt(NormSq<3>(way) - (is_on_sphere ? 0 : shift * shift)), strand.radii[k],
+                    1e-6 * strand.radii[k]);
         EXPECT_LE(domain().index().Nearest(strand.ends[k].at)->distance_sq, 1e-24);
         // Out of the ball over the subsegment beside it, and no farther than it is long.
         const double chord = Distance<3>(domain().PointAt(strand.curve, strand.arcs[0]),
                                          domain().PointAt(strand.curve, std::min(length, strand.arcs[1])));
         EXPECT_LE(strand.radii[k], 0.8 * chord * (1 + kSame));
+        EXPECT_TRUE(is_on_sphere || std::abs(shift) <= kShiftShare * chord * (1 + kSame)) << shift;
+        has_shift = has_shift || (!is_on_sphere && shift > 0.01 * chord);
         ++beside;
       }
       const auto patches =
@@ -89,6 +101,7 @@ TEST_F(CreaseSamplerTest, CollarPointsAreAtEqualDistancesOnAllPatches) {
       EXPECT_EQ(patches[0], strand.patch);
     }
     EXPECT_GT(beside, 0);
+    EXPECT_TRUE(has_shift);
     for (uint32_t group = 0; group + 1 < creases().first_of_group.size(); ++group) {
       const std::span<const Strand> strands = creases().StrandsOfGroup(group);
       for (const Strand& strand : strands) {
