@@ -2,6 +2,7 @@
 #ifndef WELLSPACE_CORE_BASE_THREAD_TEAM_H_
 #define WELLSPACE_CORE_BASE_THREAD_TEAM_H_
 
+#include <tbb/blocked_range.h>
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
@@ -10,12 +11,15 @@
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
+#include <thread>
 #include <utility>
 #include <vector>
 
 #include "absl/cleanup/cleanup.h"
 #include "absl/status/status.h"
+#include "core/base/processor_time.h"
 
 #ifdef __SANITIZE_THREAD__
 #include <sanitizer/tsan_interface.h>
@@ -23,11 +27,15 @@
 
 namespace wellspace::core {
 
+// The time that other threads work in its loops counts as that of the thread which makes and destroys it
+// (processor_time.h).
+//
 // Thread safety: thread-compatible; loops of different teams may run at once, but only one of a team.
 class ThreadTeam {
  public:
   // `threads`, but at most as many as the machine has cores; the calling thread is one of them.
   explicit ThreadTeam(int threads) : threads_(std::min(threads, tbb::info::default_concurrency())), arena_(threads_) {}
+  ~ThreadTeam() { HelpersNanoseconds() += helpers_nanoseconds_; }
 
   int threads() const { return threads_; }
 
@@ -41,10 +49,13 @@ class ThreadTeam {
     Release(&begun_);
     const absl::Cleanup acquire = [this] { Acquire(&ended_); };  // be it that a call throws
     arena_.execute([&] {
-      tbb::parallel_for(size_t{0}, count, [&](size_t i) {
+      tbb::parallel_for(tbb::blocked_range<size_t>(0, count), [&](const tbb::blocked_range<size_t>& range) {
         Acquire(&begun_);
         const absl::Cleanup release = [this] { Release(&ended_); };
-        f(i);
+        const Helper helper(*this);
+        for (size_t i = range.begin(); i != range.end(); ++i) {
+          f(i);
+        }
       });
     });
   }
@@ -89,6 +100,7 @@ class ThreadTeam {
       group_.run([this] {
         Acquire(&begun_);
         const absl::Cleanup release = [this] { Release(&ended_); };
+        const Helper helper(*this);
         call_();
       });
     });
@@ -124,10 +136,32 @@ class ThreadTeam {
   }
 
  private:
+  // Counts the time of another thread than the team's own, as long as this lives.
+  class Helper {
+   public:
+    explicit Helper(ThreadTeam& team)
+        : team_(team),
+          is_other_(std::this_thread::get_id() != team.owner_),
+          begin_(is_other_ ? ThreadNanoseconds() : 0) {}
+    ~Helper() {
+      if (is_other_) {
+        team_.helpers_nanoseconds_ += ThreadNanoseconds() - begin_;
+      }
+    }
+    Helper(const Helper&) = delete;
+    Helper& operator=(const Helper&) = delete;
+
+   private:
+    ThreadTeam& team_;
+    const bool is_other_;
+    const int64_t begin_;
+  };
+
   // Takes calls of the loop that has been begun until all are taken.
   void Work() {
     Acquire(&begun_);
     const absl::Cleanup release = [this] { Release(&ended_); };
+    const Helper helper(*this);
     while (WorkOnce()) {
     }
   }
@@ -152,6 +186,8 @@ class ThreadTeam {
 #endif
 
   const int threads_;
+  const std::thread::id owner_ = std::this_thread::get_id();
+  std::atomic<int64_t> helpers_nanoseconds_ = 0;
   tbb::task_arena arena_;
   std::function<void()> call_;
   std::function<void(size_t)> f_;

@@ -153,5 +153,36 @@ TEST(ThreadTeamTest, DropLosesWhatIsThrown) {
   EXPECT_GE(calls, 10u);
 }
 
+// Calls that wait for one another are on two threads. The team's own has the clock that it has; the other's time is
+// told when the team is no more.
+TEST(ThreadTeamTest, TimeOfHelpersCountsAsThatOfTheirTeam) {
+  const auto work_for = [](int64_t nanoseconds) {
+    const int64_t begin = ThreadNanoseconds();
+    while (ThreadNanoseconds() < begin + nanoseconds) {
+    }
+  };
+  constexpr int64_t kWork = 20'000'000;
+  const std::thread::id own = std::this_thread::get_id();
+  const int64_t before = HelpersNanoseconds();
+  {
+    ThreadTeam team(2);
+    if (team.threads() < 2) {
+      GTEST_SKIP() << "this machine has one core";
+    }
+    std::atomic<bool> has_helped = false;
+    team.BeginCall([&] {
+      work_for(std::this_thread::get_id() == own ? 0 : kWork);
+      has_helped = std::this_thread::get_id() != own;
+    });
+    while (!has_helped) {  // else End would make the call on this thread
+      std::this_thread::yield();
+    }
+    team.End();
+    EXPECT_EQ(HelpersNanoseconds(), before);
+  }
+  EXPECT_GE(HelpersNanoseconds(), before + kWork);
+  EXPECT_LT(HelpersNanoseconds(), before + 10 * kWork) << "this thread's own time is not in it";
+}
+
 }  // namespace
 }  // namespace wellspace::core
