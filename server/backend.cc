@@ -43,6 +43,7 @@ Backend::Backend(const ServiceOptions& options, const Authenticator& authenticat
       estimator_(NamingParts(std::move(estimator))),
       create_mesher_(NamingParts(std::move(create_mesher))),
       session_log_(std::move(session_log)),
+      usage_(drive.clock, *session_log_),
       request_ids_(drive.clock.since_boot, session_log_->records()),
       memory_(options_.max_memory_bytes),
       sessions_(options_, memory_, drive.clock, *session_log_, drive.make_session_name,
@@ -76,6 +77,7 @@ Backend::Backend(const ServiceOptions& options, const Authenticator& authenticat
                    .sessions = sessions_,
                    .request_ids = request_ids_,
                    .session_log = *session_log_,
+                   .usage = usage_,
                    .observability = observability,
                    .log = *log_},
       work_offers_(environment_),
@@ -86,9 +88,10 @@ Backend::Backend(const ServiceOptions& options, const Authenticator& authenticat
              .max_per_tenant = options_.max_jobs_per_tenant,
              .small_workers = options_.small_workers,
              .run_by = drive.run_by},
-            memory_) {
+            memory_, [this](const std::string& tenant, absl::Duration time) { usage_.AddTime(tenant, time); }) {
   AddMetrics(observability.metrics());
   ScheduleExpiry();
+  ScheduleUsage();
   if (session_log_->records().is_shared()) {
     ScheduleOffers();
   }
@@ -275,6 +278,16 @@ void Backend::ScheduleOffers() {
   background_.PostAfter(WorkOffers::kBetweenLooks, [this] {
     work_offers_.Look();
     ScheduleOffers();
+  });
+}
+
+void Backend::ScheduleUsage() {
+  background_.PostAfter(UsageMeter::kBetweenFlushes, [this] {
+    if (!usage_.IsEmpty()) {
+      // Where it cannot be written now, it is tried again with what comes.
+      blocking_.Run("", [this] { usage_.Flush().IgnoreError(); });
+    }
+    ScheduleUsage();
   });
 }
 

@@ -28,6 +28,7 @@
 #include "server/sessions/session_registry.h"
 #include "server/sessions/work_offers.h"
 #include "server/store/session_log.h"
+#include "server/store/usage_meter.h"
 #include "spdlog/logger.h"
 
 namespace wellspace::server {
@@ -71,6 +72,7 @@ class Backend {
  private:
   void ScheduleExpiry();
   void ScheduleOffers();
+  void ScheduleUsage();
   void RemoveExpired();
   // Writes down that sessions are no more which have expired when the disk had no room for it.
   void LogExpiries(const std::vector<SessionChange>& deletions);
@@ -90,6 +92,7 @@ class Backend {
   const Estimator estimator_;
   const MesherFactory create_mesher_;
   const std::unique_ptr<SessionLog> session_log_;
+  UsageMeter usage_;  // what jobs have told by their end is written down at this one's
   CallRegistry calls_;
   RequestIds request_ids_;
   MemoryBudget memory_;

@@ -18,6 +18,7 @@ namespace wellspace::server {
 
 class RequestIds;
 class SessionRegistry;
+class UsageMeter;
 
 // The objects that all calls share; they outlive the calls.
 struct CallEnvironment {
@@ -34,6 +35,7 @@ struct CallEnvironment {
   SessionRegistry& sessions;
   RequestIds& request_ids;
   SessionLog& session_log;
+  UsageMeter& usage;
   Observability& observability;
   spdlog::logger& log;
 };

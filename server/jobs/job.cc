@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "absl/cleanup/cleanup.h"
+#include "core/base/processor_time.h"
 #include "server/jobs/job_pool.h"
 
 namespace wellspace::server {
@@ -46,6 +47,11 @@ absl::Status Job::RunApart(const std::function<absl::Status(core::RunContext&)>&
     apart_ = nullptr;
   };
   return run(apart);
+}
+
+absl::Duration Job::TakeProcessorTime() {
+  const absl::Duration now = core::ProcessorTime();
+  return now - std::exchange(time_taken_until_, now);
 }
 
 void Job::GiveMemory(MemoryReservation memory) {

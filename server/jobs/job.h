@@ -57,6 +57,10 @@ class Job final : private core::MemoryLender, public std::enable_shared_from_thi
   // needs first: its progress is not the job's.
   absl::Status RunApart(const std::function<absl::Status(core::RunContext&)>& run);
 
+  // The processor time of the work, on all its threads, since it began or was last asked. What is asked for here is not
+  // told to the pool's OnTime.
+  absl::Duration TakeProcessorTime();
+
   // Hands in the memory of objects that the run goes on with, such as its mesher: it counts as reserved by the run.
   //
   // REQUIRES:   the run has reserved nothing yet.
@@ -97,6 +101,7 @@ class Job final : private core::MemoryLender, public std::enable_shared_from_thi
   const bool is_alone_;
   const uint64_t of_call_;
   const absl::Duration submitted_ = SinceBoot();
+  absl::Duration time_taken_until_ = absl::ZeroDuration();  // of the thread of the work
   core::RunContext context_;
 
   std::mutex apart_mutex_;             // after the pool's

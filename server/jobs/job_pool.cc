@@ -14,7 +14,8 @@
 
 namespace wellspace::server {
 
-JobPool::JobPool(const Limits& limits, MemoryBudget& memory) : limits_(limits), memory_(memory) {
+JobPool::JobPool(const Limits& limits, MemoryBudget& memory, OnTime on_time)
+    : limits_(limits), memory_(memory), on_time_(std::move(on_time)) {
   memory_.SetReleaseListener([this] {
     std::lock_guard lock(mutex_);
     Dispatch();
@@ -435,8 +436,12 @@ void JobPool::RunFirst(std::unique_lock<std::mutex>& lock) {
   begun_.emplace(job->sequence_, job);
   Job::Work work = std::exchange(job->work_, nullptr);
   lock.unlock();
+  job->TakeProcessorTime();
   work(*job);
   work = nullptr;
+  if (on_time_ != nullptr) {
+    on_time_(job->tenant_, job->TakeProcessorTime());
+  }
   if (memory_.is_limited()) {
     malloc_trim(0);  // others may have its memory once the system has it
   }

@@ -76,8 +76,11 @@ class JobPool {
     Begun others;
   };
 
+  // Told how much processor time a job of `tenant` has taken; by its thread, without a lock.
+  using OnTime = std::function<void(const std::string& tenant, absl::Duration time)>;
+
   // REQUIRES:   `memory` outlives this.
-  JobPool(const Limits& limits, MemoryBudget& memory);
+  JobPool(const Limits& limits, MemoryBudget& memory, OnTime on_time = nullptr);
   // Cancels all jobs and waits for the running ones.
   ~JobPool();
   JobPool(const JobPool&) = delete;
@@ -174,6 +177,7 @@ class JobPool {
 
   const Limits limits_;
   MemoryBudget& memory_;
+  const OnTime on_time_;  // may be null
   mutable std::mutex mutex_;
   std::condition_variable wake_;
   // Guarded by mutex_. Jobs are by their sequence. Where a job is, and what counts it, by its state:

@@ -41,7 +41,7 @@ PointAccount::PointAccount(std::string session, int dimension, bool in_memory, c
                            MemoryBudget& memory, std::shared_ptr<TenantPoints> tenant)
     : session_(std::move(session)),
       bytes_per_point_(in_memory ? dimension * sizeof(double) : 0),
-      stored_bytes_per_point_(dimension * sizeof(double)),
+      dimension_(dimension),
       bytes_per_size_((dimension + 1) * sizeof(double)),
       options_(options),
       memory_(memory),

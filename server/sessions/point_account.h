@@ -101,6 +101,11 @@ class PointAccount {
 
     uint64_t count() const { return points + features.all() + sizes; }
   };
+  // The bytes of these amounts that count against the tenant's limit.
+  static uint64_t StoredBytesOf(const Held& held, int dimension) {
+    return held.points * dimension * sizeof(double) + FeatureBytes(held.features) +
+           held.sizes * (dimension + 1) * sizeof(double) + held.mesh_bytes;
+  }
   // Takes the amounts of the session before the start of the server, whatever the limits are now. To be called first.
   void Restore(const Held& held);
 
@@ -122,9 +127,7 @@ class PointAccount {
   }
   // Wherever it is kept.
   StoredAmount AmountOf(const Held& held) const {
-    const uint64_t bytes = held.points * stored_bytes_per_point_ + FeatureBytes(held.features) +
-                           held.sizes * bytes_per_size_ + held.mesh_bytes;
-    return {.points = held.count(), .bytes = bytes};
+    return {.points = held.count(), .bytes = StoredBytesOf(held, dimension_)};
   }
   StoredAmount Limits() const;
   // The excess of `held` over the amounts in the account. REQUIRES: no amount is less.
@@ -139,7 +142,7 @@ class PointAccount {
 
   const std::string session_;
   const uint64_t bytes_per_point_;  // in memory
-  const uint64_t stored_bytes_per_point_;
+  const int dimension_;
   const uint64_t bytes_per_size_;
   const ServiceOptions& options_;
   MemoryBudget& memory_;

@@ -218,6 +218,7 @@ void Run(const CallEnvironment& environment, const std::shared_ptr<Session>& ses
       .points = inputs.point_count(),
       .replayed_steps = work->mesher == nullptr && !is_first ? steps.count() : 0,
   };
+  const uint64_t vertices_before = is_first ? 0 : work->mesh->record().vertices();
   absl::StatusOr<Made> made = Work(environment.create_mesher, *session, inputs,
                                    inputs.ParametersOf(operation->parameters()), is_first, job, *work);
   report.status = made.status();
@@ -228,11 +229,14 @@ void Run(const CallEnvironment& environment, const std::shared_ptr<Session>& ses
   } else {
     made = Made();
   }
+  const uint64_t new_vertices = report.vertices - std::min(report.vertices, vertices_before);
   environment.observability.work().OnRefinement(report);  // before clients see the end
   const auto result = std::make_shared<WorkResult>(WorkResult{.status = report.status,
                                                               .work = *std::move(work),
                                                               .mesh = std::move(made->mesh),
-                                                              .delta = std::move(made->delta)});
+                                                              .delta = std::move(made->delta),
+                                                              .new_vertices = new_vertices,
+                                                              .processor_time = job.TakeProcessorTime()});
   EndWhenPossible(environment, session, operation, result);
 }
 

@@ -20,6 +20,8 @@ PointAccount::Held HeldBy(const SessionState& state) {
   for (const SizesInUse& set : UnusedSizes(state, {}, 0)) {  // all of them
     held.sizes += set.count;
   }
+  const store::v1::MeshRecord& mesh = state.record.mesh();
+  held.mesh_bytes = MeshSnapshot::LoadedBytes(mesh.domain_low_size(), mesh.vertices(), mesh.simplices());
   return held;
 }
 
@@ -125,12 +127,10 @@ Session::Session(SessionState state, std::vector<store::v1::StepRecord::Points> 
                                                 .files = PointsFilesOf(state.record),
                                                 .committed = std::move(committed),
                                                 .next = NextFile(state)})} {
-  PointAccount::Held held = HeldBy(state);
+  const PointAccount::Held held = HeldBy(state);
   stores_.are_loaded = held.features.all() == 0 && held.sizes == 0 && !state.record.has_rules();
   if (state.record.has_mesh()) {
-    const std::shared_ptr<MeshSnapshot> mesh = log_.files().FindMesh(state.record);
-    held.mesh_bytes = mesh->loaded_bytes();
-    meshes_.Restore(mesh);
+    meshes_.Restore(log_.files().FindMesh(state.record));
   }
   account_.Restore(held);
   state_ = std::make_shared<const SessionState>(std::move(state));
@@ -142,6 +142,10 @@ absl::Status Session::Make(SessionChange& change, absl::FunctionRef<void()> also
   WELLSPACE_RETURN_IF_ERROR(RunGuarded([&]() -> absl::Status {
     change_mutex_.AssertHeld();
     WELLSPACE_ASSIGN_OR_RETURN(SessionState applied, Apply(*state(), change));
+    if (change.state.has_value()) {
+      change.state->set_stored_bytes(PointAccount::StoredBytesOf(HeldBy(applied), dimension()));
+      applied.record.set_stored_bytes(change.state->stored_bytes());
+    }
     after = std::make_shared<const SessionState>(std::move(applied));
     if (!change.answer.has_value()) {
       change.answer = answer(*after);
@@ -163,7 +167,9 @@ absl::Status Session::Commit(const SessionChange& change, Survives survives) {
       return Elsewhere(name());
     }
     if (occupancy_.is_closed) {
-      return absl::OkStatus();
+      // What was done for a session that was deleted meanwhile was done all the same.
+      return change.usage.empty() ? absl::OkStatus()
+                                  : log_.Commit({.session = "", .epoch = change.epoch, .usage = change.usage});
     }
   }
   absl::Status committed = log_.Commit(change, survives);

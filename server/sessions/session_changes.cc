@@ -171,6 +171,17 @@ SessionChange StartChange(const SessionState& state, const OperationRecord& oper
   return change;
 }
 
+store::v1::UsageRecord UsageOf(const SessionState& state, absl::Time now, absl::Duration processor_time,
+                               std::optional<uint64_t> new_vertices) {
+  store::v1::UsageRecord usage;
+  usage.set_tenant(state.record.tenant());
+  usage.set_day(DayOf(now));
+  usage.set_meshes(new_vertices.has_value() ? 1 : 0);
+  usage.set_vertices(new_vertices.value_or(0));
+  usage.set_processor_time_ns(absl::ToInt64Nanoseconds(processor_time));
+  return usage;
+}
+
 SessionChange OperationChange(const SessionState& state, const OperationRecord& operation) {
   SessionChange change = EmptyChange(state);
   change.operations.push_back(operation);

@@ -80,6 +80,10 @@ store::v1::OperationRecord NewOperation(const SessionState& state, const core::M
 SessionChange StartChange(const SessionState& state, const store::v1::OperationRecord& operation,
                           const AppendedPoints& appended);
 
+// The usage of work that is done for the session's tenant. `new_vertices` absent: it has made no mesh.
+store::v1::UsageRecord UsageOf(const SessionState& state, absl::Time now, absl::Duration processor_time,
+                               std::optional<uint64_t> new_vertices);
+
 // An operation that was started is from now on as `operation` says: it begins, is cancelled, fails or is parked.
 SessionChange OperationChange(const SessionState& state, const store::v1::OperationRecord& operation);
 

@@ -182,6 +182,7 @@ absl::Status Session::CommitSuccess(Operation& operation, WorkResult& result) {
     const store::v1::MeshRecord& mesh = result.mesh->record();
     change = SuccessChange(
         *state(), operation.RecordOfSuccess(clock_.wall(), mesh.revision(), mesh.vertices(), mesh.simplices()), mesh);
+    change.usage = {UsageOf(*state(), clock_.wall(), result.processor_time, result.new_vertices)};
     return Make(change, show);
   });
   if (!status.ok()) {
@@ -208,6 +209,7 @@ bool Session::EndWork(Operation& operation, WorkResult& result) {
       const auto record = std::make_shared<const store::v1::OperationRecord>(
           is_parked ? operation.RecordOfParking() : operation.RecordOfFailure(clock_.wall(), result.status));
       SessionChange change = OperationChange(*state(), *record);
+      change.usage = {UsageOf(*state(), clock_.wall(), result.processor_time, std::nullopt)};
       const absl::Status made = Make(change, [] {});
       // A failure that is not written down is no end: the next owner would go on with the operation.
       const bool is_store_away = absl::IsUnavailable(made) && !is_parked && !IsElsewhere();

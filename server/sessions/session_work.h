@@ -2,10 +2,12 @@
 #ifndef WELLSPACE_SERVER_SESSIONS_SESSION_WORK_H_
 #define WELLSPACE_SERVER_SESSIONS_SESSION_WORK_H_
 
+#include <cstdint>
 #include <memory>
 #include <utility>
 
 #include "absl/status/status.h"
+#include "absl/time/time.h"
 #include "core/meshers/mesher.h"
 #include "server/jobs/memory_budget.h"
 #include "server/sessions/mesh_deltas.h"
@@ -30,6 +32,8 @@ struct WorkResult {
   SessionWork work;                    // that of BeginWork; on an error its mesher is as it was, or null
   std::shared_ptr<MeshSnapshot> mesh;  // the new mesh, if the status is OK
   MeshDeltas::Delta delta{};           // from the last mesh to it; null: not made
+  uint64_t new_vertices = 0;           // of the new mesh, those that the last one has not
+  absl::Duration processor_time = absl::ZeroDuration();
 };
 
 }  // namespace wellspace::server

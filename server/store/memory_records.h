@@ -15,7 +15,7 @@
 
 namespace wellspace::server {
 
-// Keeps the answers, and of a session its epoch: a Session has its state.
+// Keeps the answers, the usage, and of a session its epoch and its record's part in that: a Session has its state.
 //
 // Thread safety: that of Records.
 class MemoryRecords : public Records {
@@ -33,6 +33,7 @@ class MemoryRecords : public Records {
   absl::StatusOr<std::vector<StoredSizes>> ReadSizes(const std::string& /*session*/) override {
     return std::vector<StoredSizes>();
   }
+  absl::StatusOr<UsageByTenant> ReadUsage(const UsageRange& range) override;
   absl::StatusOr<std::optional<store::v1::SessionRecord>> ReadRecord(const std::string& /*session*/) override {
     return std::optional<store::v1::SessionRecord>();
   }
@@ -41,11 +42,17 @@ class MemoryRecords : public Records {
  private:
   static constexpr uint64_t kFirstEpoch = 1;
 
+  struct Kept {
+    uint64_t epoch = 0;
+    store::v1::SessionRecord record{};  // tenant and stored bytes alone
+  };
+
   std::mutex mutex_;
   // Guarded by mutex_.
   uint64_t last_epoch_ = kFirstEpoch;
-  std::unordered_map<std::string, uint64_t> epochs_;                                // by session
+  std::unordered_map<std::string, Kept> sessions_;                                  // by name
   std::map<std::pair<std::string, std::string>, store::v1::AnswerRecord> answers_;  // by tenant and request_id
+  std::map<std::pair<std::string, int32_t>, store::v1::UsageRecord> usage_;         // by tenant and day
 };
 
 }  // namespace wellspace::server

@@ -83,6 +83,7 @@ absl::Status ClearFor(pqxx::dbtransaction& transaction, const DataFolder& folder
   // The folder does not belong to the database, so that no server can have begun with the two.
   transaction.exec0("DELETE FROM wellspace.sessions");
   transaction.exec0("DELETE FROM wellspace.answers");
+  transaction.exec0("DELETE FROM wellspace.usage");
   transaction.exec0("DELETE FROM wellspace.owners");
   transaction.exec_params0("UPDATE wellspace.store SET folder = $1", AbsolutePath(folder));
   return absl::OkStatus();

@@ -161,7 +161,7 @@ absl::Status PostgresRecords::ApplyTogether(std::span<const SessionChange* const
         return OwnedElsewhere(change->session);  // this process is no owner any more
       }
     }
-    return absl::OkStatus();
+    return WriteUsage(rows, changes);
   }));
 }
 
@@ -275,6 +275,32 @@ absl::StatusOr<std::vector<std::string>> PostgresRecords::ListOffered() {
   return names;
 }
 
+absl::StatusOr<std::vector<StoredOperation>> PostgresRecords::ListOperations(const OperationPlace& after,
+                                                                             size_t count) {
+  std::vector<StoredOperation> listed;
+  WELLSPACE_RETURN_IF_ERROR(reading_.Read([&](pqxx::dbtransaction& transaction) -> absl::Status {
+    listed.clear();
+    for (const pqxx::row& row : transaction.exec_prepared(
+             sql::kListOperations, after.session, static_cast<int64_t>(after.number), static_cast<int64_t>(count))) {
+      const auto id = row[0].as<int64_t>();
+      const auto number = row[1].as<int64_t>();
+      WELLSPACE_ASSIGN_OR_RETURN(
+          store::v1::OperationRecord operation,
+          Parse<store::v1::OperationRecord>(KeyOfOperation(id, number), row, 2,
+                                            absl::StrCat("operation ", number, " of session ", id)));
+      WELLSPACE_ASSIGN_OR_RETURN(const StoredSession session, ParseSession(row, 4));
+      listed.push_back({.place = {.session = id, .number = static_cast<uint64_t>(number)},
+                        .session = session.state.name(),
+                        .tenant = session.state.tenant(),
+                        .owner = row[9].as<std::string>(),
+                        .address = row[10].as<std::string>(),
+                        .operation = std::move(operation)});
+    }
+    return absl::OkStatus();
+  }));
+  return listed;
+}
+
 absl::StatusOr<std::optional<SessionOwner>> PostgresRecords::FindOwner(const std::string& session) {
   std::optional<SessionOwner> owner;
   WELLSPACE_RETURN_IF_ERROR(owning_.Read([&](pqxx::dbtransaction& transaction) -> absl::Status {
@@ -353,6 +379,26 @@ absl::StatusOr<std::optional<store::v1::SessionRecord>> PostgresRecords::ReadRec
     return absl::OkStatus();
   }));
   return record;
+}
+
+absl::StatusOr<UsageByTenant> PostgresRecords::ReadUsage(const UsageRange& range) {
+  UsageByTenant usage;
+  WELLSPACE_RETURN_IF_ERROR(reading_.Read([&](pqxx::dbtransaction& transaction) -> absl::Status {
+    usage.clear();
+    for (const pqxx::row& row :
+         transaction.exec_prepared(sql::kReadUsage, Blob(range.tenant), range.first_day, range.last_day)) {
+      WELLSPACE_ASSIGN_OR_RETURN(const store::v1::UsageRecord record, sql::ParseUsage(row));
+      AddWork(record, usage);
+    }
+    for (const pqxx::row& row : transaction.exec("SELECT id, name, epoch, state, crc32c FROM wellspace.sessions")) {
+      WELLSPACE_ASSIGN_OR_RETURN(const StoredSession session, ParseSession(row));
+      if (range.tenant.empty() || range.tenant == session.state.tenant()) {
+        AddSession(session.state, usage);
+      }
+    }
+    return absl::OkStatus();
+  }));
+  return usage;
 }
 
 absl::StatusOr<Census> PostgresRecords::ReadCensus() {

@@ -48,6 +48,7 @@ class PostgresRecords final : public Records {
   void Forget(std::span<const AnswerKey> answers) override { queue_.Forget(answers); }
   absl::StatusOr<std::vector<store::v1::StepRecord::Features>> ReadFeatures(const std::string& session) override;
   absl::StatusOr<std::vector<StoredSizes>> ReadSizes(const std::string& session) override;
+  absl::StatusOr<UsageByTenant> ReadUsage(const UsageRange& range) override;
   absl::StatusOr<std::optional<store::v1::SessionRecord>> ReadRecord(const std::string& session) override;
   absl::StatusOr<Census> ReadCensus() override;
 
@@ -58,6 +59,7 @@ class PostgresRecords final : public Records {
   absl::StatusOr<std::vector<StoredSession>> TakeOrphans() override;
   absl::StatusOr<std::vector<StoredSession>> TakeOffered(const RoomForWork& room) override;
   absl::StatusOr<std::vector<std::string>> ListOffered() override;
+  absl::StatusOr<std::vector<StoredOperation>> ListOperations(const OperationPlace& after, size_t count) override;
 
  private:
   PostgresRecords(const PostgresOptions& options, std::shared_ptr<StoreHealth> health);

@@ -61,6 +61,10 @@ absl::Status CopyRows(pqxx::dbtransaction& transaction, int64_t epoch, RecordRow
     WELLSPACE_ASSIGN_OR_RETURN(const store::v1::AnswerRecord answer, ParseAnswer(row));
     WELLSPACE_RETURN_IF_ERROR(rows.InsertAnswer(answer, pqxx::binarystring(row[2]).str()).status());
   }
+  for (const pqxx::row& row : transaction.exec("SELECT tenant, day, owner, record, crc32c FROM wellspace.usage")) {
+    WELLSPACE_ASSIGN_OR_RETURN(const store::v1::UsageRecord usage, ParseUsage(row));
+    WELLSPACE_RETURN_IF_ERROR(AddUsage(rows, usage));
+  }
   return absl::OkStatus();
 }
 

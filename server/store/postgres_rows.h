@@ -3,6 +3,7 @@
 #define WELLSPACE_SERVER_STORE_POSTGRES_ROWS_H_
 
 #include <cstdint>
+#include <optional>
 #include <pqxx/pqxx>
 #include <string>
 #include <string_view>
@@ -63,13 +64,13 @@ inline absl::StatusOr<store::v1::StepRecord> ParseStep(const pqxx::row& row) {
                                       absl::StrCat("step ", number, " of session ", session));
 }
 
-// A row of id, name, epoch, state and crc32c.
-inline absl::StatusOr<StoredSession> ParseSession(const pqxx::row& row) {
-  const auto name = row[1].as<std::string>();
-  StoredSession session{.epoch = row[2].as<uint64_t>(), .state = {}, .steps = {}, .operations = {}};
+// A row of id, name, epoch, state and crc32c, from the column `first` on.
+inline absl::StatusOr<StoredSession> ParseSession(const pqxx::row& row, int first = 0) {
+  const auto name = row[first + 1].as<std::string>();
+  StoredSession session{.epoch = row[first + 2].as<uint64_t>(), .state = {}, .steps = {}, .operations = {}};
   WELLSPACE_ASSIGN_OR_RETURN(
       session.state,
-      Parse<store::v1::SessionRecord>(KeyOf(name), row, 3, absl::StrCat("the record of session '", name, "'")));
+      Parse<store::v1::SessionRecord>(KeyOf(name), row, first + 3, absl::StrCat("the record of session '", name, "'")));
   return session;
 }
 
@@ -78,6 +79,14 @@ inline absl::StatusOr<store::v1::AnswerRecord> ParseAnswer(const pqxx::row& row)
   const pqxx::binarystring request(row[1]);
   return Parse<store::v1::AnswerRecord>(KeyOfAnswer(tenant.str(), request.str()), row, 2,
                                         absl::StrCat("the answer to request '", request.str(), "'"));
+}
+
+// A row of tenant, day, owner, record and crc32c.
+inline absl::StatusOr<store::v1::UsageRecord> ParseUsage(const pqxx::row& row) {
+  const std::string tenant = pqxx::binarystring(row[0]).str();
+  const auto day = row[1].as<int64_t>();
+  return Parse<store::v1::UsageRecord>(KeyOfUsage(tenant, day, row[2].as<int64_t>()), row, 3,
+                                       absl::StrCat("the usage of tenant '", tenant, "' on day ", day));
 }
 
 // The rows that a change writes, for an owner.
@@ -136,6 +145,20 @@ class PostgresRows final : public RecordRows {
         transaction_.exec_prepared(kInsertAnswer, Blob(answer.tenant()), Blob(answer.request_id()), Blob(record),
                                    Checksum(KeyOfAnswer(answer.tenant(), answer.request_id()), record));
     return inserted.affected_rows() > 0;
+  }
+
+  absl::StatusOr<std::optional<store::v1::UsageRecord>> FindUsage(const std::string& tenant, int32_t day) override {
+    std::optional<store::v1::UsageRecord> found;
+    const pqxx::result rows = transaction_.exec_prepared(kFindUsage, Blob(tenant), int64_t{day}, owner_);
+    if (!rows.empty()) {
+      WELLSPACE_ASSIGN_OR_RETURN(found, ParseUsage(rows[0]));
+    }
+    return found;
+  }
+
+  absl::Status PutUsage(const store::v1::UsageRecord& usage, const std::string& record) override {
+    return Run(kPutUsage, Blob(usage.tenant()), int64_t{usage.day()}, owner_, Blob(record),
+               Checksum(KeyOfUsage(usage.tenant(), usage.day(), owner_), record));
   }
 
  private:

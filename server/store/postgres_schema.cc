@@ -49,6 +49,9 @@ constexpr std::array kPostgresMigrations = {
     "                               PRIMARY KEY(tenant, request_id));"
     // The last transaction of each link that was committed (PostgresLink). time: of that.
     "CREATE TABLE wellspace.commits(link text PRIMARY KEY, number bigint NOT NULL, time timestamptz NOT NULL);",
+    // owner: of a process that has told it, and that may be no more. Each writes its own rows: none waits for another.
+    "CREATE TABLE wellspace.usage(tenant bytea NOT NULL, day bigint NOT NULL, owner bigint NOT NULL,"
+    "                             record bytea NOT NULL, crc32c bigint NOT NULL, PRIMARY KEY(tenant, day, owner));",
 };
 constexpr int kVersion = kFirstVersion + static_cast<int>(kPostgresMigrations.size()) - 1;
 
@@ -75,6 +78,12 @@ constexpr std::pair<const char*, const char*> kStatements[] = {
      " UPDATE wellspace.sessions SET owner = $1, epoch = nextval('wellspace.epochs'), offered_at = NULL"
      " FROM offered WHERE sessions.id = offered.id RETURNING sessions.id"},
     {sql::kListOffered, "SELECT name FROM wellspace.sessions WHERE offered_at IS NOT NULL AND owner = $1"},
+    {sql::kListOperations,
+     "SELECT operations.session, number, operations.record, operations.crc32c,"
+     "       sessions.id, sessions.name, sessions.epoch, state, sessions.crc32c, owners.name, coalesce(address, '')"
+     " FROM wellspace.operations JOIN wellspace.sessions ON sessions.id = session"
+     " JOIN wellspace.owners ON owners.id = owner"
+     " WHERE (session, number) > ($1, $2) ORDER BY session, number LIMIT $3"},
     {sql::kReadSession, "SELECT id, name, epoch, state, crc32c FROM wellspace.sessions WHERE name = $1"},
     {sql::kNextStep, "SELECT coalesce(max(number) + 1, 0) FROM wellspace.steps WHERE session = $1"},
     {sql::kInsertStep, "INSERT INTO wellspace.steps(session, number, kind, record, crc32c) VALUES($1, $2, $3, $4, $5)"},
@@ -102,6 +111,14 @@ constexpr std::pair<const char*, const char*> kStatements[] = {
     {sql::kReadAnswer,
      "SELECT tenant, request_id, record, crc32c FROM wellspace.answers WHERE tenant = $1 AND request_id = $2"},
     {sql::kDropAnswer, "DELETE FROM wellspace.answers WHERE tenant = $1 AND request_id = $2"},
+    {sql::kPutUsage,
+     "INSERT INTO wellspace.usage(tenant, day, owner, record, crc32c) VALUES($1, $2, $3, $4, $5)"
+     " ON CONFLICT(tenant, day, owner) DO UPDATE SET record = excluded.record, crc32c = excluded.crc32c"},
+    {sql::kFindUsage,
+     "SELECT tenant, day, owner, record, crc32c FROM wellspace.usage WHERE tenant = $1 AND day = $2 AND owner = $3"},
+    {sql::kReadUsage,
+     "SELECT tenant, day, owner, record, crc32c FROM wellspace.usage"
+     " WHERE ($1 = ''::bytea OR tenant = $1) AND day BETWEEN $2 AND $3"},
     {sql::kRenewLease,
      "UPDATE wellspace.owners SET lease_until = clock_timestamp() + make_interval(secs => $2) WHERE id = $1"},
     {sql::kGiveBack, "UPDATE wellspace.owners SET lease_until = '-infinity' WHERE id = $1"},

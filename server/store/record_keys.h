@@ -38,6 +38,11 @@ inline std::string KeyOfAnswer(std::string_view tenant, std::string_view request
   return absl::StrCat("answer ", tenant.size(), " ", std::string(tenant), " ", std::string(request_id));
 }
 
+// `owner`: of the row, where several have rows of one tenant and day; else 0.
+inline std::string KeyOfUsage(std::string_view tenant, int64_t day, int64_t owner) {
+  return absl::StrCat("usage ", std::string(tenant), " ", day, " ", owner);
+}
+
 // Whether `record` is that of `key`, undamaged.
 template <typename Record>
 bool ParseRecord(const std::string& key, std::string_view bytes, int64_t checksum, Record& record) {

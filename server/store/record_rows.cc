@@ -1,5 +1,7 @@
 #include "server/store/record_rows.h"
 
+#include <map>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -100,6 +102,32 @@ absl::Status WriteChange(RecordRows& rows, const SessionChange& change) {
   WELLSPACE_ASSIGN_OR_RETURN(const bool is_first,
                              rows.InsertAnswer(*change.answer, change.answer->SerializeAsString()));
   return is_first ? absl::OkStatus() : AnsweredBefore(change.answer->request_id());
+}
+
+absl::Status WriteUsage(RecordRows& rows, std::span<const SessionChange* const> changes) {
+  std::map<std::pair<std::string, int32_t>, store::v1::UsageRecord> sums;
+  for (const SessionChange* change : changes) {
+    for (const store::v1::UsageRecord& usage : change->usage) {
+      store::v1::UsageRecord& sum = sums[{usage.tenant(), usage.day()}];
+      sum.set_tenant(usage.tenant());
+      sum.set_day(usage.day());
+      AddWork(usage, sum);
+    }
+  }
+  for (const auto& [key, sum] : sums) {
+    WELLSPACE_RETURN_IF_ERROR(AddUsage(rows, sum));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status AddUsage(RecordRows& rows, const store::v1::UsageRecord& usage) {
+  WELLSPACE_ASSIGN_OR_RETURN(const std::optional<store::v1::UsageRecord> before,
+                             rows.FindUsage(usage.tenant(), usage.day()));
+  store::v1::UsageRecord sum = usage;
+  if (before.has_value()) {
+    AddWork(*before, sum);
+  }
+  return rows.PutUsage(sum, sum.SerializeAsString());
 }
 
 }  // namespace wellspace::server

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "absl/status/status.h"
@@ -50,6 +51,11 @@ class RecordRows {
 
   // False: there is an answer to this request.
   virtual absl::StatusOr<bool> InsertAnswer(const store::v1::AnswerRecord& answer, const std::string& record) = 0;
+
+  // The usage of a tenant on a day, as far as the owner of these rows has told it.
+  virtual absl::StatusOr<std::optional<store::v1::UsageRecord>> FindUsage(const std::string& tenant, int32_t day) = 0;
+  // New, or in the place of that.
+  virtual absl::Status PutUsage(const store::v1::UsageRecord& usage, const std::string& record) = 0;
 };
 
 // Writes `change`, if the session is still at its epoch.
@@ -57,6 +63,12 @@ class RecordRows {
 // Errors:     those of Records::Apply. INTERNAL: it creates a session that is there, or one without a record. The
 //             transaction is to be rolled back then.
 absl::Status WriteChange(RecordRows& rows, const SessionChange& change);
+
+// Adds the usage of `changes`, which have been written: each tenant's row of a day is written once.
+absl::Status WriteUsage(RecordRows& rows, std::span<const SessionChange* const> changes);
+
+// Adds `usage` to what there is.
+absl::Status AddUsage(RecordRows& rows, const store::v1::UsageRecord& usage);
 
 }  // namespace wellspace::server
 

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -12,6 +14,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/time/time.h"
 #include "wellspace/store/v1/records.pb.h"
 
 namespace wellspace::server {
@@ -36,7 +39,7 @@ struct WorkOffer {
   std::string tenant{};  // of the session
 };
 
-// The parts of one change of a session: all of them are made, or none.
+// The parts of one change of a session: all of them are made, or none. A change without a session has usage alone.
 //
 // Epochs: a process that takes a session over from its owner gets its epoch, a number that none had before. A change
 //         has the epoch of its owner, and is made only while the session is still at it. So an owner that was stopped,
@@ -53,6 +56,7 @@ struct SessionChange {
   std::optional<StoredSizes> sizes{};                    // a new set
   std::vector<uint64_t> dropped_sizes{};                 // the numbers of sets
   std::optional<WorkOffer> offer{};                      // none: as before; but operations that change end an offer
+  std::vector<store::v1::UsageRecord> usage{};           // comes on top of that of these tenants and days
   std::optional<store::v1::AnswerRecord> answer{};       // to the request that has made the change
   bool is_deletion = false;                              // of the session and all that it has
 };
@@ -89,6 +93,47 @@ struct RoomForWork {
   int sessions = 0;                         // that have one operation each
   std::vector<std::string> full_tenants{};  // whose work has no place here
 };
+
+// The place of an operation among all that are stored: the row of its session, and its number. The first is after {}.
+struct OperationPlace {
+  int64_t session = 0;
+  uint64_t number = 0;
+};
+
+// An operation, and who has it.
+struct StoredOperation {
+  OperationPlace place;
+  std::string session;  // its name
+  std::string tenant;   // of the session
+  std::string owner;    // the name of the process
+  std::string address;  // where it serves; empty: it has not told
+  store::v1::OperationRecord operation;
+};
+
+// The usage that is asked for.
+struct UsageRange {
+  std::string tenant{};  // empty: all
+  int64_t first_day = std::numeric_limits<int32_t>::min();
+  int64_t last_day = std::numeric_limits<int32_t>::max();
+};
+
+// The usage of a tenant: its work of the days asked for, and the data that its sessions keep now.
+struct TenantUsage {
+  uint64_t meshes = 0;
+  uint64_t vertices = 0;
+  int64_t processor_time_ns = 0;
+  uint64_t sessions = 0;
+  uint64_t stored_bytes = 0;
+};
+using UsageByTenant = std::map<std::string, TenantUsage>;
+
+// Adds the work of `record`.
+void AddWork(const store::v1::UsageRecord& record, UsageByTenant& usage);
+void AddWork(const store::v1::UsageRecord& more, store::v1::UsageRecord& sum);
+// Adds what the session of `record` keeps.
+void AddSession(const store::v1::SessionRecord& record, UsageByTenant& usage);
+// The day of `time` in UsageRecord.
+int32_t DayOf(absl::Time time);
 
 // The owner of a session, where several processes share the records.
 struct SessionOwner {
@@ -155,6 +200,12 @@ class Records {
   // The sets of sizes of a session, ascending by number.
   virtual absl::StatusOr<std::vector<StoredSizes>> ReadSizes(const std::string& session) = 0;
 
+  // What SessionChange.usage has told, by all processes, and what sessions keep, as of one moment. Of a tenant that has
+  // neither there is nothing.
+  //
+  // Complexity: O(sessions + days of tenants): looks at all of them.
+  virtual absl::StatusOr<UsageByTenant> ReadUsage(const UsageRange& range) = 0;
+
   // The record of a session; none: there is no such session, or none is kept.
   virtual absl::StatusOr<std::optional<store::v1::SessionRecord>> ReadRecord(const std::string& session) = 0;
 
@@ -188,6 +239,12 @@ class Records {
   // session is taken by two processes, or once its operation has begun. To be called again and again.
   virtual absl::StatusOr<std::vector<StoredSession>> TakeOffered(const RoomForWork& /*room*/) {
     return std::vector<StoredSession>();
+  }
+
+  // The first `count` operations behind `after`, of all owners, those of a session together.
+  virtual absl::StatusOr<std::vector<StoredOperation>> ListOperations(const OperationPlace& /*after*/,
+                                                                      size_t /*count*/) {
+    return std::vector<StoredOperation>();
   }
 
   // The names of the sessions that this process offers, and still owns.

@@ -32,6 +32,8 @@ constexpr std::array kMigrations = {
     "ALTER TABLE sessions ADD COLUMN epoch INTEGER NOT NULL DEFAULT 0;"
     "CREATE TABLE epochs(id INTEGER PRIMARY KEY CHECK(id = 0), last INTEGER NOT NULL, everything INTEGER NOT NULL,"
     "                    crc32c INTEGER NOT NULL);",
+    "CREATE TABLE usage(tenant TEXT NOT NULL, day INTEGER NOT NULL, record BLOB NOT NULL, crc32c INTEGER NOT NULL,"
+    "                   PRIMARY KEY(tenant, day)) WITHOUT ROWID;",
 };
 
 absl::Status Migrate(SqliteDatabase& database, int64_t version) {

@@ -15,6 +15,7 @@ struct SessionTables::Statements {
   SqliteStatement put_operation, drop_operation, delete_operations;
   SqliteStatement insert_sizes, read_sizes, drop_sizes, delete_sizes;
   SqliteStatement put_answer, read_answer, drop_answer;
+  SqliteStatement put_usage, find_usage, read_usage;
 };
 
 }  // namespace wellspace::server

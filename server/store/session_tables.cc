@@ -100,6 +100,10 @@ absl::Status SessionTables::Prepare() {
       {&statements_->read_answer,
        "SELECT tenant, request_id, record, crc32c FROM answers WHERE tenant = ? AND request_id = ?"},
       {&statements_->drop_answer, "DELETE FROM answers WHERE tenant = ? AND request_id = ?"},
+      {&statements_->put_usage, "REPLACE INTO usage(tenant, day, record, crc32c) VALUES(?, ?, ?, ?)"},
+      {&statements_->find_usage, "SELECT tenant, day, record, crc32c FROM usage WHERE tenant = ? AND day = ?"},
+      {&statements_->read_usage,
+       "SELECT tenant, day, record, crc32c FROM usage WHERE (?1 = '' OR tenant = ?1) AND day BETWEEN ?2 AND ?3"},
   };
   for (const auto& [into, statement] : statements) {
     WELLSPACE_RETURN_IF_ERROR(prepare(*into, statement));
@@ -120,7 +124,8 @@ absl::Status SessionTables::SetSurvives(Survives survives) {
 // The rows of a transaction.
 class SessionTables::Rows final : public RecordRows {
  public:
-  explicit Rows(SessionTables& tables) : database_(*tables.database_), statements_(*tables.statements_) {}
+  explicit Rows(SessionTables& tables)
+      : tables_(tables), database_(*tables.database_), statements_(*tables.statements_) {}
 
   absl::StatusOr<Row> FindSession(const std::string& session) override {
     SqliteStatement& find = statements_.find_session;
@@ -201,6 +206,20 @@ class SessionTables::Rows final : public RecordRows {
     return sqlite3_changes(database_.handle()) > 0;
   }
 
+  absl::StatusOr<std::optional<store::v1::UsageRecord>> FindUsage(const std::string& tenant, int32_t day) override {
+    SqliteStatement& find = statements_.find_usage;
+    find.Bind(std::string_view(tenant), int64_t{day});
+    std::optional<store::v1::UsageRecord> found;
+    WELLSPACE_RETURN_IF_ERROR(
+        tables_.ForEach(find, nullptr, [&](const SqliteStatement& row) { return ParseUsage(row, found.emplace()); }));
+    return found;
+  }
+
+  absl::Status PutUsage(const store::v1::UsageRecord& usage, const std::string& record) override {
+    return Run(statements_.put_usage, std::string_view(usage.tenant()), int64_t{usage.day()},
+               SqliteStatement::Blob{record}, ChecksumOf(KeyOfUsage(usage.tenant(), usage.day(), /*owner=*/0), record));
+  }
+
  private:
   template <typename... Values>
   static absl::Status Run(SqliteStatement& statement, const Values&... values) {
@@ -208,6 +227,7 @@ class SessionTables::Rows final : public RecordRows {
     return statement.Run();
   }
 
+  SessionTables& tables_;
   SqliteDatabase& database_;
   Statements& statements_;
 };
@@ -224,7 +244,7 @@ absl::Status SessionTables::Apply(std::span<const SessionChange* const> changes,
     for (const SessionChange* change : changes) {
       WELLSPACE_RETURN_IF_ERROR(WriteChange(rows, *change));
     }
-    return absl::OkStatus();
+    return WriteUsage(rows, changes);
   });
 }
 

@@ -83,6 +83,9 @@ class SessionTables {
   absl::StatusOr<std::vector<store::v1::StepRecord::Features>> ReadFeatures(const std::string& session);
   absl::StatusOr<std::vector<StoredSizes>> ReadSizes(const std::string& session);
 
+  // As Records::ReadUsage.
+  absl::StatusOr<UsageByTenant> ReadUsage(const UsageRange& range);
+
   // As Records::FindAnswer.
   absl::StatusOr<std::optional<store::v1::AnswerRecord>> FindAnswer(const AnswerKey& request);
 
@@ -139,10 +142,14 @@ class SessionTables {
   absl::StatusOr<uint64_t> ChecksumAt(const std::string& session, int64_t epoch);
   absl::Status SetSurvives(Survives survives);
 
+  // Parses the record in a row of tenant, day, record and crc32c. Returns its damage; empty: there is none.
+  static std::string ParseUsage(const SqliteStatement& row, store::v1::UsageRecord& usage);
+
   // Calls `take` with each row of `statement`. A fault that it returns is an error, or goes into `problems`.
   absl::Status ForEach(SqliteStatement& statement, std::vector<std::string>* problems,
                        const std::function<std::string(const SqliteStatement& row)>& take);
   absl::Status CopyRowsLocked(int64_t epoch, RecordRows& rows);
+  absl::Status CopyUsageLocked(RecordRows& rows);
   // Of all sessions, or of the one that there is.
   absl::Status LoadSteps(std::span<StoredSession> sessions, std::span<const int64_t> ids, bool is_of_one,
                          std::vector<std::string>* problems);

@@ -27,7 +27,19 @@ std::string ParseAnswer(const SqliteStatement& row, store::v1::AnswerRecord& ans
              : absl::StrCat("the answer to request '", std::string(row.Bytes(1)), "' is damaged");
 }
 
+// Has `read` answer the rows of `range`.
+void BindAll(const UsageRange& range, SqliteStatement& read) {
+  read.Bind(std::string_view(range.tenant), range.first_day, range.last_day);
+}
+
 }  // namespace
+
+std::string SessionTables::ParseUsage(const SqliteStatement& row, store::v1::UsageRecord& usage) {
+  return ParseRecord(KeyOfUsage(row.Bytes(0), row.Number(1), /*owner=*/0), row.Bytes(2), row.Number(3), usage)
+             ? ""
+             : absl::StrCat("the usage of tenant '", std::string(row.Bytes(0)), "' on day ", row.Number(1),
+                            " is damaged");
+}
 
 absl::Status SessionTables::ForEach(SqliteStatement& statement, std::vector<std::string>* problems,
                                     const std::function<std::string(const SqliteStatement& row)>& take) {
@@ -71,7 +83,13 @@ absl::StatusOr<StoredSessions> SessionTables::Load(std::vector<std::string>* pro
       return std::string();
     }));
     WELLSPACE_RETURN_IF_ERROR(LoadSteps(stored.sessions, ids, /*is_of_one=*/false, problems));
-    return LoadAnswers(stored.answers, problems);
+    WELLSPACE_RETURN_IF_ERROR(LoadAnswers(stored.answers, problems));
+    // It is not loaded, and is looked at so that no damage can hide from the start, or from a check.
+    BindAll(UsageRange(), statements_->read_usage);
+    return ForEach(statements_->read_usage, problems, [](const SqliteStatement& row) {
+      store::v1::UsageRecord usage;
+      return ParseUsage(row, usage);
+    });
   };
   const absl::Status loaded = load();
   WELLSPACE_RETURN_IF_ERROR(database_->Execute("COMMIT"));
@@ -137,7 +155,7 @@ absl::Status SessionTables::CopyRowsLocked(int64_t epoch, RecordRows& rows) {
         return rows.InsertSizes(id_of(row), row.Number(1), row.Number(2), record);
       },
       store::v1::SizesRecord()));
-  return copy(
+  WELLSPACE_RETURN_IF_ERROR(copy(
       "SELECT tenant, request_id, record, crc32c FROM answers", 2,
       [](const SqliteStatement& row) { return KeyOfAnswer(row.Bytes(0), row.Bytes(1)); },
       [&](const SqliteStatement& /*row*/, const std::string& record) -> absl::Status {
@@ -145,7 +163,22 @@ absl::Status SessionTables::CopyRowsLocked(int64_t epoch, RecordRows& rows) {
         answer.ParseFromString(record);
         return rows.InsertAnswer(answer, record).status();
       },
-      store::v1::AnswerRecord());
+      store::v1::AnswerRecord()));
+  return CopyUsageLocked(rows);
+}
+
+absl::Status SessionTables::CopyUsageLocked(RecordRows& rows) {
+  absl::Status status;  // of `rows`
+  BindAll(UsageRange(), statements_->read_usage);
+  WELLSPACE_RETURN_IF_ERROR(ForEach(statements_->read_usage, nullptr, [&](const SqliteStatement& row) {
+    store::v1::UsageRecord usage;
+    std::string problem = ParseUsage(row, usage);
+    if (problem.empty() && status.ok()) {
+      status = AddUsage(rows, usage);
+    }
+    return problem;
+  }));
+  return status;
 }
 
 absl::Status SessionTables::LoadSteps(std::span<StoredSession> sessions, std::span<const int64_t> ids, bool is_of_one,
@@ -309,6 +342,31 @@ absl::StatusOr<std::optional<store::v1::AnswerRecord>> SessionTables::FindAnswer
   WELLSPACE_RETURN_IF_ERROR(
       ForEach(read, nullptr, [&](const SqliteStatement& row) { return ParseAnswer(row, answer.emplace()); }));
   return answer;
+}
+
+absl::StatusOr<UsageByTenant> SessionTables::ReadUsage(const UsageRange& range) {
+  const std::lock_guard lock(mutex_);
+  UsageByTenant usage;
+  BindAll(range, statements_->read_usage);
+  WELLSPACE_RETURN_IF_ERROR(ForEach(statements_->read_usage, nullptr, [&](const SqliteStatement& row) {
+    store::v1::UsageRecord record;
+    std::string problem = ParseUsage(row, record);
+    if (problem.empty()) {
+      AddWork(record, usage);
+    }
+    return problem;
+  }));
+  WELLSPACE_ASSIGN_OR_RETURN(SqliteStatement rows,
+                             database_->Prepare("SELECT id, name, state, crc32c, epoch FROM sessions"));
+  WELLSPACE_RETURN_IF_ERROR(ForEach(rows, nullptr, [&](const SqliteStatement& row) {
+    store::v1::SessionRecord record;
+    std::string problem = ParseSession(row, record);
+    if (problem.empty() && (range.tenant.empty() || range.tenant == record.tenant())) {
+      AddSession(record, usage);
+    }
+    return problem;
+  }));
+  return usage;
 }
 
 absl::StatusOr<std::vector<std::string>> SessionTables::CheckFile() {

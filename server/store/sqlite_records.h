@@ -50,6 +50,7 @@ class SqliteRecords final : public Records {
   absl::StatusOr<std::vector<StoredSizes>> ReadSizes(const std::string& session) override {
     return tables_->ReadSizes(session);
   }
+  absl::StatusOr<UsageByTenant> ReadUsage(const UsageRange& range) override { return tables_->ReadUsage(range); }
   absl::StatusOr<std::optional<store::v1::SessionRecord>> ReadRecord(const std::string& session) override {
     return tables_->ReadState(session);
   }

@@ -7,6 +7,7 @@
 #include "server/base/clock.h"
 #include "server/calls/wire.h"
 #include "server/jobs/job_size.h"
+#include "server/store/usage_meter.h"
 #include "server/wire/convert.h"
 #include "server/wire/errors.h"
 
@@ -21,6 +22,7 @@ void MeshPointsCall::Work(NumberChunks& points, Job& job) {
     mesh = std::make_shared<MeshChunks>(std::move(made));
     mesh->KeepMemory(job.TakeMemory(mesh->memory_bytes()));
     environment().observability.work().OnMesh(mesh->mesh().vertex_count(), mesh->mesh().simplex_count());
+    environment().usage.AddMesh(job.tenant(), mesh->mesh().vertex_count());
     return absl::OkStatus();
   });
   std::lock_guard lock(mutex_);

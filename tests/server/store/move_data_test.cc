@@ -58,6 +58,12 @@ class MoveDataTest : public ::testing::Test {
     change.steps.push_back(MakePointsStep(1, {4, 5, 6}, 3));
     change.operations.emplace_back().set_number(1);
     change.operations.emplace_back().set_number(2);
+    for (const int32_t day : {7, 8}) {
+      store::v1::UsageRecord& usage = change.usage.emplace_back();
+      usage.set_tenant(absl::StrCat("tenant ", number));
+      usage.set_day(day);
+      usage.set_vertices(number * day);
+    }
     for (const uint64_t set : {2, 5}) {
       StoredSizes sizes{.number = set, .parts = {}};
       sizes.parts.emplace_back().mutable_samples()->add_sizes(0.5 * static_cast<double>(number));
@@ -86,6 +92,13 @@ class MoveDataTest : public ::testing::Test {
         for (const auto& part : sizes.parts) {
           absl::StrAppend(&text, part.DebugString());
         }
+      }
+    }
+    for (const int64_t day : {7, 8}) {
+      const absl::StatusOr<UsageByTenant> all_usage = log.records().ReadUsage({.first_day = day, .last_day = day});
+      EXPECT_TRUE(all_usage.ok()) << all_usage.status();
+      for (const auto& [tenant, usage] : *all_usage) {
+        absl::StrAppend(&text, "day ", day, ": ", tenant, " ", usage.vertices, " ", usage.stored_bytes, "\n");
       }
     }
     return text;
@@ -119,6 +132,7 @@ TEST_F(MoveDataTest, ThereAndBack) {
     before = TextOf(*own);
     own_epoch = own->records().epoch();
     EXPECT_THAT(before, HasSubstr("request 2"));
+    EXPECT_THAT(before, HasSubstr("day 8: tenant 2 16"));
   }
   ASSERT_EQ(MoveToPostgres(folder_.path(), database_), absl::OkStatus());
   EXPECT_FALSE(Has("sessions.db"));

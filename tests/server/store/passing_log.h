@@ -38,6 +38,7 @@ class PassingRecords : public Records {
   absl::StatusOr<std::optional<store::v1::SessionRecord>> ReadRecord(const std::string& session) override {
     return records().ReadRecord(session);
   }
+  absl::StatusOr<UsageByTenant> ReadUsage(const UsageRange& range) override { return records().ReadUsage(range); }
   absl::StatusOr<Census> ReadCensus() override { return records().ReadCensus(); }
 
  private:

@@ -98,6 +98,30 @@ class RecordsTest : public ::testing::TestWithParam<Implementation> {
     return change;
   }
 
+  static store::v1::UsageRecord Usage(const std::string& tenant, int32_t day, uint64_t vertices) {
+    store::v1::UsageRecord usage;
+    usage.set_tenant(tenant);
+    usage.set_day(day);
+    usage.set_meshes(1);
+    usage.set_vertices(vertices);
+    usage.set_processor_time_ns(static_cast<int64_t>(10 * vertices));
+    return usage;
+  }
+
+  // Of each tenant its name, meshes, vertices, processor time, sessions and stored bytes.
+  static std::string UsageIn(Records& records, const UsageRange& range = {}) {
+    const absl::StatusOr<UsageByTenant> usage = records.ReadUsage(range);
+    if (!usage.ok()) {
+      return usage.status().ToString();
+    }
+    std::string text;
+    for (const auto& [tenant, of] : *usage) {
+      absl::StrAppend(&text, tenant, " ", of.meshes, " ", of.vertices, " ", of.processor_time_ns, " ", of.sessions, " ",
+                      of.stored_bytes, "\n");
+    }
+    return text;
+  }
+
   // The session as another process finds it, as far as anything is kept.
   std::string Found(const std::string& session) {
     const auto record = first_->ReadRecord(session).value();
@@ -231,6 +255,49 @@ TEST_P(RecordsTest, ARefusedChangeCostsNoOther) {
   EXPECT_EQ(wrong, 0);
 }
 
+TEST_P(RecordsTest, UsageIsCountedWithItsChangeOrNot) {
+  SessionChange creation = Creation(1, first_->epoch());
+  creation.state->set_tenant("one");
+  creation.state->set_stored_bytes(1000);
+  creation.usage = {Usage("one", 5, 7)};
+  ASSERT_TRUE(Apply(*first_, creation).ok());
+  EXPECT_EQ(UsageIn(*first_), "one 1 7 70 1 1000\n");
+  SessionChange change = Change(1, first_->epoch(), "a");
+  change.state->set_tenant("one");
+  change.state->set_stored_bytes(3000);
+  change.usage = {Usage("one", 5, 1), Usage("two", 6, 2), Usage("one", 5, 30)};
+  ASSERT_TRUE(Apply(*first_, change).ok());
+  const std::string told = "one 3 38 380 1 3000\ntwo 1 2 20 0 0\n";
+  EXPECT_EQ(UsageIn(*first_), told);
+  SessionChange repeated = Change(1, first_->epoch(), "a", 3);
+  repeated.usage = change.usage;
+  EXPECT_TRUE(IsAnsweredBefore(Apply(*first_, repeated)));
+  change.epoch += 7;
+  EXPECT_TRUE(IsOwnedElsewhere(Apply(*first_, change)));
+  EXPECT_EQ(UsageIn(*first_), told) << "a refused change counts nothing";
+  ASSERT_TRUE(Apply(*first_, {.session = SessionName(1), .epoch = first_->epoch(), .is_deletion = true}).ok());
+  EXPECT_EQ(UsageIn(*first_), "one 3 38 380 0 0\ntwo 1 2 20 0 0\n") << "work stays, bytes do not";
+}
+
+TEST_P(RecordsTest, UsageOfNoSessionIsAskedForByTenantAndDay) {
+  const auto tell = [&](Records& records, const store::v1::UsageRecord& usage) {
+    return Apply(records, {.session = "", .epoch = records.epoch(), .usage = {usage}});
+  };
+  ASSERT_TRUE(tell(*first_, Usage("one", 5, 1)).ok());
+  ASSERT_TRUE(tell(*first_, Usage("one", 6, 10)).ok());
+  ASSERT_TRUE(tell(*first_, Usage("two", 6, 100)).ok());
+  const std::shared_ptr<Records> second = shared_->Begin();
+  ASSERT_TRUE(tell(*second, Usage("one", 6, 1000)).ok());
+  ASSERT_TRUE(tell(*second, Usage("one", 6, 2000)).ok());
+  for (Records* records : {first_.get(), second.get()}) {
+    EXPECT_EQ(UsageIn(*records), "one 4 3011 30110 0 0\ntwo 1 100 1000 0 0\n");
+    EXPECT_EQ(UsageIn(*records, {.tenant = "one"}), "one 4 3011 30110 0 0\n");
+    EXPECT_EQ(UsageIn(*records, {.tenant = "one", .first_day = 6}), "one 3 3010 30100 0 0\n");
+    EXPECT_EQ(UsageIn(*records, {.last_day = 5}), "one 1 1 10 0 0\n");
+    EXPECT_EQ(UsageIn(*records, {.tenant = "none"}), "");
+  }
+}
+
 // Of records that are kept.
 class DurableRecordsTest : public RecordsTest {};
 
@@ -256,6 +323,40 @@ TEST_P(DurableRecordsTest, WhoTakesASessionGetsAllOfIt) {
   const Census census = second->ReadCensus().value();
   EXPECT_EQ(census.sessions.size(), 2u) << "of all owners";
   EXPECT_FALSE(second->Take(SessionName(3)).value().has_value());
+}
+
+TEST_P(DurableRecordsTest, OperationsAreListedOfAllOwnersWhereThereAreSeveral) {
+  const std::shared_ptr<Records> second = shared_->Begin();
+  if (!first_->is_shared()) {
+    EXPECT_THAT(*first_->ListOperations({}, 10), ::testing::IsEmpty());
+    return;
+  }
+  ASSERT_TRUE(first_->Announce("first:1").ok());
+  for (int number = 1; number <= 3; ++number) {
+    Records& owner = number == 2 ? *second : *first_;
+    ASSERT_TRUE(Apply(owner, Creation(number, owner.epoch())).ok());
+    ASSERT_TRUE(Apply(owner, Change(number, owner.epoch(), absl::StrCat(number), 5)).ok());
+    ASSERT_TRUE(Apply(owner, Change(number, owner.epoch(), absl::StrCat(number, "b"), 7)).ok());
+  }
+  for (const size_t count : {1, 2, 4, 100}) {
+    std::string listed;
+    OperationPlace after;
+    for (bool is_last = false; !is_last;) {
+      const std::vector<StoredOperation> page = second->ListOperations(after, count).value();
+      ASSERT_LE(page.size(), count);
+      is_last = page.size() < count;
+      for (const StoredOperation& one : page) {
+        absl::StrAppend(&listed,
+                        one.session == SessionName(2)   ? "2"
+                        : one.session == SessionName(1) ? "1"
+                                                        : "3",
+                        ".", one.operation.number(), one.owner == "process 1" ? "f" : "s",
+                        one.address == "first:1" ? "a" : "", " ");
+        after = one.place;
+      }
+    }
+    EXPECT_EQ(listed, "1.5fa 1.7fa 2.5s 2.7s 3.5fa 3.7fa ");
+  }
 }
 
 const Implementation kMemory = {"Memory", [] { return std::make_unique<SharedMemory>(); }};
