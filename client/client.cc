@@ -121,6 +121,22 @@ absl::StatusOr<Operation> Client::WatchOperation(const std::string& operation, c
   return connection_->WatchOperation(operation, on_progress, after_sequence, call);
 }
 
+absl::StatusOr<OwnedOperationPage> Client::ListAllOperations(const OperationFilter& filter, const PageOptions& page,
+                                                             const CallOptions& call) {
+  return connection_->ListAllOperations(filter, page, call);
+}
+
+absl::StatusOr<Operation> Client::CancelAnyOperation(const std::string& operation, const CallOptions& call) {
+  return connection_->CancelAnyOperation(operation, call);
+}
+
+absl::StatusOr<absl::Duration> Client::DrainServer(const CallOptions& call) { return connection_->DrainServer(call); }
+
+absl::StatusOr<UsagePage> Client::GetUsage(const UsageFilter& filter, const PageOptions& page,
+                                           const CallOptions& call) {
+  return connection_->GetUsage(filter, page, call);
+}
+
 absl::Status Client::ApproximateNearestNeighbors(const std::string& session, std::span<const uint32_t> vertices,
                                                  const OnDistances& on_distances, const CallOptions& call) {
   return connection_->ApproximateNearestNeighbors(session, vertices, on_distances, call);

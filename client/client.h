@@ -144,6 +144,15 @@ class Client {
                                            std::optional<uint64_t> after_sequence = std::nullopt,
                                            const CallOptions& call = {});
 
+  // Administration; see the proto's AdminService. Ends with PERMISSION_DENIED (ADMIN_ONLY) without an admin's token.
+  absl::StatusOr<OwnedOperationPage> ListAllOperations(const OperationFilter& filter = {}, const PageOptions& page = {},
+                                                       const CallOptions& call = {});
+  absl::StatusOr<Operation> CancelAnyOperation(const std::string& operation, const CallOptions& call = {});
+  // Returns the time that running work has from now on.
+  absl::StatusOr<absl::Duration> DrainServer(const CallOptions& call = {});
+  absl::StatusOr<UsagePage> GetUsage(const UsageFilter& filter = {}, const PageOptions& page = {},
+                                     const CallOptions& call = {});
+
   // The query structure; see the proto's QueryService. Answers come in the order of `vertices`; empty: of all vertices.
   absl::Status ApproximateNearestNeighbors(const std::string& session, std::span<const uint32_t> vertices,
                                            const OnDistances& on_distances, const CallOptions& call = {});

@@ -97,6 +97,13 @@ class Connection {
   virtual absl::StatusOr<AddedVertices> AddVertices(const std::string& session, std::span<const double> points,
                                                     std::span<const uint32_t> near, const OnAdded& on_added,
                                                     const CallOptions& call) = 0;
+
+  virtual absl::StatusOr<OwnedOperationPage> ListAllOperations(const OperationFilter& filter, const PageOptions& page,
+                                                               const CallOptions& call) = 0;
+  virtual absl::StatusOr<Operation> CancelAnyOperation(const std::string& operation, const CallOptions& call) = 0;
+  virtual absl::StatusOr<absl::Duration> DrainServer(const CallOptions& call) = 0;
+  virtual absl::StatusOr<UsagePage> GetUsage(const UsageFilter& filter, const PageOptions& page,
+                                             const CallOptions& call) = 0;
 };
 
 // Opens a channel to a server that another one has named as the owner of a session. `address` is HOST:PORT.

@@ -443,6 +443,47 @@ struct OperationPage {
   std::string next_page_token;  // empty: this was the last
 };
 
+// Which operations of all tenants are listed. See the proto's ListAllOperationsRequest.
+struct OperationFilter {
+  std::string tenant{};                   // empty: all
+  std::optional<OperationState> state{};  // none: any
+};
+
+// An operation, and whose it is. See the proto's OwnedOperation.
+struct OwnedOperation {
+  Operation operation;
+  std::string tenant;
+  std::string replica;  // empty: servers share no database
+  std::string address;  // of that; empty: not known
+};
+
+struct OwnedOperationPage {
+  std::vector<OwnedOperation> operations;
+  std::string next_page_token;  // empty: this was the last
+};
+
+// Which usage is told. See the proto's GetUsageRequest.
+struct UsageFilter {
+  std::string tenant{};     // empty: all
+  std::string first_day{};  // "YYYY-MM-DD" in UTC; empty: from the beginning
+  std::string last_day{};   // empty: until now
+};
+
+// See the proto's TenantUsage.
+struct TenantUsage {
+  std::string tenant;
+  uint64_t meshes = 0;
+  uint64_t vertices = 0;
+  absl::Duration processor_time;
+  uint64_t sessions = 0;
+  uint64_t stored_bytes = 0;
+};
+
+struct UsagePage {
+  std::vector<TenantUsage> usage;
+  std::string next_page_token;  // empty: this was the last
+};
+
 // Points and revision of a session after an upload.
 struct Uploaded {
   uint64_t committed_points = 0;

@@ -126,8 +126,8 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& optio
                                             std::move(mesher), std::move(estimator), std::move(create_mesher)));
   WELLSPACE_RETURN_IF_ERROR(server->observability_.ListenForHttp(options.observability));
   WELLSPACE_RETURN_IF_ERROR(server->backend_.Restore());
-  const std::array<grpc::Service*, 4> services = {&server->meshing_, &server->sessions_, &server->operations_,
-                                                  &server->queries_};
+  const std::array<grpc::Service*, 5> services = {&server->meshing_, &server->sessions_, &server->operations_,
+                                                  &server->queries_, &server->admin_};
   for (grpc::Service* service : services) {
     builder.RegisterService(service);
   }
@@ -162,7 +162,8 @@ ConnectionLimits Server::LimitsOf(const ServerOptions& options) {
 
 std::vector<std::string> Server::ServiceNames() {
   return {v1::MeshingService::service_full_name(), v1::SessionService::service_full_name(),
-          v1::OperationService::service_full_name(), v1::QueryService::service_full_name()};
+          v1::OperationService::service_full_name(), v1::QueryService::service_full_name(),
+          v1::AdminService::service_full_name()};
 }
 
 std::string Server::TenantOf(const grpc::ServerContextBase& context) const {

@@ -18,6 +18,7 @@
 #include "server/network/listener.h"
 #include "server/observability/observability.h"
 #include "server/security/security.h"
+#include "server/services/admin/admin_service.h"
 #include "server/services/meshing/meshing_service.h"
 #include "server/services/operations/operation_service.h"
 #include "server/services/queries/query_service.h"
@@ -115,6 +116,7 @@ class Server {
   SessionService sessions_{backend_.environment()};
   OperationService operations_{backend_.environment()};
   QueryService queries_{backend_.environment()};
+  AdminService admin_{backend_.environment()};
   std::string address_;
   std::unique_ptr<Listener> listener_;  // null: none
   std::unique_ptr<grpc::Server> server_;

@@ -61,7 +61,6 @@ constexpr absl::Duration kMostLease = absl::Minutes(10);
 
 struct Flags {
   ServerOptions server;
-  absl::Duration grace = absl::Seconds(10);
   std::string log_level = "info";
   std::string log_format = "text";
   std::string data;           // the folder of the session log; empty: sessions end with the process
@@ -69,8 +68,9 @@ struct Flags {
   bool is_ephemeral = false;  // sessions end with the process, whatever stands above
   bool checks_configuration = false;
   std::string hash_for_tenant;  // makes a line of tokens and does not serve
-  std::string checked_folder;   // checks it and does not serve
-  std::string copied_folder;    // copies it to the next and does not serve
+  bool hashes_for_admin = false;
+  std::string checked_folder;  // checks it and does not serve
+  std::string copied_folder;   // copies it to the next and does not serve
   std::string copy;
   std::string moved_folder;  // moves its records to the store, or back, and does not serve
   bool moves_back = false;
@@ -86,7 +86,8 @@ void DeclareSecurity(CLI::App& app, SecurityOptions& security) {
   app.add_flag("--tls-require-client-cert", security.tls.require_client_certificate,
                "Break off connections without a client certificate in the handshake already");
   app.add_option("--token-file", security.token_file,
-                 "Lines TENANT sha256:HEX, one for each token; `wellspaced hash-token` makes them")
+                 "Lines TENANT sha256:HEX, one for each token, and `admin` behind those of operators; `wellspaced "
+                 "hash-token` makes them")
       ->type_name("FILE");
   app.add_flag("--insecure-remote", security.insecure_remote,
                "Allow to listen in plain text, or without authentication, where other machines can connect");
@@ -126,7 +127,7 @@ void Declare(CLI::App& app, Flags& flags) {
   DeclareLimits(app, flags.server.service);
   DeclareConnections(app, flags.server.connections);
   DeclareStore(app, flags);
-  AddSeconds(app, "--grace", flags.grace, absl::ZeroDuration(), kMaxGrace,
+  AddSeconds(app, "--grace", flags.server.service.grace, absl::ZeroDuration(), kMaxGrace,
              "Time that running work gets to end after SIGTERM or SIGINT");
   app.add_option("--log-level", flags.log_level, "What to log on standard error")
       ->check(CLI::IsMember({"debug", "info", "warning", "error", "off"}))
@@ -147,9 +148,10 @@ void Declare(CLI::App& app, Flags& flags) {
          "Print the options in force and where each comes from, check them and the files that they name, and exit")
       ->configurable(false);
   DeclareVariables(app);
-  app.add_subcommand("hash-token", "Print the line of --token-file for the token that is read from standard input")
-      ->add_option("tenant", flags.hash_for_tenant, "Tenant whose calls show the token")
-      ->required();
+  CLI::App& hash = *app.add_subcommand("hash-token",
+                                       "Print the line of --token-file for the token that is read from standard input");
+  hash.add_option("tenant", flags.hash_for_tenant, "Tenant whose calls show the token")->required();
+  hash.add_flag("--admin", flags.hashes_for_admin, "Calls with the token may administer the server: `wellspace admin`");
   app.add_subcommand("check-data", "Check every byte of a folder of --data, also while a server serves it")
       ->add_option("folder", flags.checked_folder, "The folder")
       ->type_name("DIR")
@@ -205,7 +207,7 @@ LogFields StartOf(const Flags& flags, const Server& server) {
     fields.Add("store", ShownPostgresAddress(flags.store.address).value_or(""));
     fields.Add("replica", flags.store.owner).Add("lease_seconds", absl::ToDoubleSeconds(flags.store.lease));
   }
-  return fields.Add("grace_seconds", absl::ToDoubleSeconds(flags.grace));
+  return fields.Add("grace_seconds", absl::ToDoubleSeconds(flags.server.service.grace));
 }
 
 // The exit code after text was printed to standard output: not 0 if it got lost.
@@ -218,10 +220,10 @@ int ExitOfPrinted(const std::string& what) {
   return 0;
 }
 
-int HashToken(const std::string& tenant) {
+int HashToken(const Flags& flags) {
   std::string token;
   std::getline(std::cin, token);
-  const absl::StatusOr<std::string> line = MakeTokenLine(tenant, token);
+  const absl::StatusOr<std::string> line = MakeTokenLine(flags.hash_for_tenant, token, flags.hashes_for_admin);
   if (!line.ok()) {
     std::cerr << "wellspaced: " << line.status().message() << std::endl;
     return kExitWrongOptions;
@@ -388,7 +390,7 @@ std::optional<int> Parse(CLI::App& app, int argc, char** argv) {
 // Runs what does not serve, if it is asked for. An exit code: the process is to end with it.
 std::optional<int> RunCommand(const Flags& flags) {
   if (!flags.hash_for_tenant.empty()) {
-    return HashToken(flags.hash_for_tenant);
+    return HashToken(flags);
   }
   if (!flags.checked_folder.empty()) {
     return Report(flags.checked_folder, CheckData(flags.checked_folder));
@@ -447,6 +449,7 @@ int RunWellspaced(int argc, char** argv) {
     std::cerr << "wellspaced: --data " << flags.data << store << ": " << session_log.status().message() << std::endl;
     return 1;
   }
+  flags.server.service.begin_drain = [] { kill(getpid(), SIGTERM); };  // which this thread waits for
   absl::StatusOr<std::unique_ptr<Server>> server = Server::Start(flags.server, log, *std::move(session_log));
   if (!server.ok()) {
     std::cerr << "wellspaced: " << server.status().message() << std::endl;
@@ -457,9 +460,9 @@ int RunWellspaced(int argc, char** argv) {
 
   const int received = signals.Wait();
   TellServiceManager("STOPPING=1");
-  log->info("event=stopping signal={} grace={}", received, absl::FormatDuration(flags.grace));
+  log->info("event=stopping signal={} grace={}", received, absl::FormatDuration(flags.server.service.grace));
   signals.Release();
-  (*server)->Shutdown(flags.grace);
+  (*server)->Shutdown(flags.server.service.grace);
   *server = nullptr;  // work that has not ended is the next process's from here on
   log->info("event=stopped");
   return 0;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <numeric>
 #include <string>
@@ -76,25 +77,17 @@ SurfaceFeatures SurfaceFromProto(const v1::SurfaceOptions& message) {
   return surface;
 }
 
-OperationState StateFromProto(v1::Operation::State state) {
-  switch (state) {
-    case v1::Operation::STATE_QUEUED:
-      return OperationState::kQueued;
-    case v1::Operation::STATE_RUNNING:
-      return OperationState::kRunning;
-    case v1::Operation::STATE_SUCCEEDED:
-      return OperationState::kSucceeded;
-    case v1::Operation::STATE_FAILED:
-      return OperationState::kFailed;
-    case v1::Operation::STATE_CANCELLED:
-      return OperationState::kCancelled;
-    default:
-      return OperationState::kUnknown;
-  }
-}
+constexpr std::pair<OperationState, v1::Operation::State> kStates[] = {
+    {OperationState::kUnknown, v1::Operation::STATE_UNSPECIFIED},
+    {OperationState::kQueued, v1::Operation::STATE_QUEUED},
+    {OperationState::kRunning, v1::Operation::STATE_RUNNING},
+    {OperationState::kSucceeded, v1::Operation::STATE_SUCCEEDED},
+    {OperationState::kFailed, v1::Operation::STATE_FAILED},
+    {OperationState::kCancelled, v1::Operation::STATE_CANCELLED}};
 
-absl::Duration DurationFromProto(const google::protobuf::Duration& message) {
-  return absl::Seconds(message.seconds()) + absl::Nanoseconds(message.nanos());
+OperationState StateFromProto(v1::Operation::State state) {
+  const auto* const found = std::ranges::find(kStates, state, [](const auto& pair) { return pair.second; });
+  return found == std::end(kStates) ? OperationState::kUnknown : found->first;
 }
 
 absl::Time TimeFromProto(const google::protobuf::Timestamp& message) {
@@ -441,6 +434,14 @@ absl::StatusOr<Session> SessionFromProto(const v1::Session& message) {
                  .names = NamesFromProto(message.names()),
                  .size_count = message.size_count(),
                  .stored_bytes = message.stored_bytes()};
+}
+
+absl::Duration DurationFromProto(const google::protobuf::Duration& message) {
+  return absl::Seconds(message.seconds()) + absl::Nanoseconds(message.nanos());
+}
+
+v1::Operation::State StateToProto(OperationState state) {
+  return std::ranges::find(kStates, state, [](const auto& pair) { return pair.first; })->second;
 }
 
 Operation OperationFromProto(const v1::Operation& message) {

@@ -25,6 +25,9 @@ ServerInfo InfoFromProto(const v1::GetServerInfoResponse& response);
 // Errors:     DATA_LOSS for a dimension that no space has.
 absl::StatusOr<Session> SessionFromProto(const v1::Session& message);
 Operation OperationFromProto(const v1::Operation& message);
+// UNSPECIFIED for kUnknown.
+v1::Operation::State StateToProto(OperationState state);
+absl::Duration DurationFromProto(const google::protobuf::Duration& message);
 
 // Whether another page may follow that of `token`.
 //

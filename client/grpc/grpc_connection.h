@@ -91,6 +91,14 @@ class GrpcConnection final : public Connection {
   absl::StatusOr<TransferredValues> TransferValues(const std::string& session, std::span<const double> values,
                                                    const TransferOptions& options, const CallOptions& call) override;
 
+  // admin.cc
+  absl::StatusOr<OwnedOperationPage> ListAllOperations(const OperationFilter& filter, const PageOptions& page,
+                                                       const CallOptions& call) override;
+  absl::StatusOr<Operation> CancelAnyOperation(const std::string& operation, const CallOptions& call) override;
+  absl::StatusOr<absl::Duration> DrainServer(const CallOptions& call) override;
+  absl::StatusOr<UsagePage> GetUsage(const UsageFilter& filter, const PageOptions& page,
+                                     const CallOptions& call) override;
+
  private:
   // Makes a unary call of the first server until its status is final; the answer is in `response`.
   template <typename Stub, typename Request, typename Response>

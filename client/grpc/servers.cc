@@ -60,6 +60,7 @@ Server::Server(std::string named, const std::shared_ptr<grpc::Channel>& channel)
       sessions(v1::SessionService::NewStub(channel)),
       operations(v1::OperationService::NewStub(channel)),
       queries(v1::QueryService::NewStub(channel)),
+      admin(v1::AdminService::NewStub(channel)),
       health(grpc::health::v1::Health::NewStub(channel)) {}
 
 Servers::Servers(const std::shared_ptr<grpc::Channel>& channel, OpenChannelTo open)

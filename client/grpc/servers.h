@@ -15,6 +15,7 @@
 #include "client/connection.h"
 #include "client/grpc/retry.h"
 #include "grpc/health/v1/health.grpc.pb.h"
+#include "wellspace/v1/admin.grpc.pb.h"
 #include "wellspace/v1/meshing.grpc.pb.h"
 #include "wellspace/v1/operations.grpc.pb.h"
 #include "wellspace/v1/queries.grpc.pb.h"
@@ -37,6 +38,7 @@ struct Server {
   const std::unique_ptr<v1::SessionService::Stub> sessions;
   const std::unique_ptr<v1::OperationService::Stub> operations;
   const std::unique_ptr<v1::QueryService::Stub> queries;
+  const std::unique_ptr<v1::AdminService::Stub> admin;
   const std::unique_ptr<grpc::health::v1::Health::Stub> health;
 };
 

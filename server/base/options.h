@@ -3,6 +3,7 @@
 #define WELLSPACE_SERVER_BASE_OPTIONS_H_
 
 #include <cstdint>
+#include <functional>
 
 #include "absl/time/time.h"
 #include "core/meshers/mesher.h"
@@ -58,6 +59,10 @@ struct ServiceOptions {
 
   // The time that it waits for the next message of a client that sends.
   absl::Duration upload_stall_limit = absl::Minutes(5);
+
+  // The end of the server, as AdminService.DrainServer asks for it.
+  absl::Duration grace = absl::Seconds(10);  // that running work gets then
+  std::function<void()> begin_drain{};       // has Server::Shutdown called soon by another thread; null: none can
 };
 
 }  // namespace wellspace::server

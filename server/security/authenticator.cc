@@ -45,11 +45,11 @@ absl::StatusOr<Caller> CallerByToken(const TokenTable& tokens, const grpc::Serve
   if (std::next(first) != last || !absl::StartsWithIgnoreCase({value.data(), value.size()}, kScheme.data())) {
     return Unauthenticated("the metadata `authorization` is not one `Bearer TOKEN`");
   }
-  std::optional<std::string> tenant = tokens.TenantOf(value.substr(kScheme.size()));
-  if (!tenant.has_value()) {
+  std::optional<Caller> caller = tokens.CallerOf(value.substr(kScheme.size()));
+  if (!caller.has_value()) {
     return Unauthenticated("this server does not know the token");
   }
-  return Caller{.tenant = *std::move(tenant)};
+  return *std::move(caller);
 }
 
 }  // namespace

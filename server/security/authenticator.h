@@ -13,10 +13,6 @@
 
 namespace wellspace::server {
 
-struct Caller {
-  std::string tenant = "default";  // a name as IsTenantName wants it
-};
-
 // Knows callers by their bearer token (metadata `authorization: Bearer TOKEN`), by their client certificate, or takes
 // all of them for the tenant "default".
 //

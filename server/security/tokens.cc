@@ -15,6 +15,7 @@ namespace {
 
 constexpr size_t kMaxTenantLength = 64;
 constexpr std::string_view kHashPrefix = "sha256:";
+constexpr char kAdmin[] = "admin";
 constexpr char kTenantRule[] = "1 to 64 letters, digits, '.', '_', '@' and '-', the first a letter or a digit";
 
 absl::string_view View(std::string_view text) { return {text.data(), text.size()}; }
@@ -59,33 +60,35 @@ absl::StatusOr<TokenTable> TokenTable::Parse(std::string_view text) {
       continue;
     }
     // The line itself stays out of the messages: it may be a token that was not hashed by mistake.
-    const std::string digest = fields.size() == 2 ? ParseHash(fields[1]) : "";
+    const bool is_admin = fields.size() == 3 && fields[2] == kAdmin;
+    const std::string digest = fields.size() == 2 || is_admin ? ParseHash(fields[1]) : "";
     if (digest.empty()) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("line ", number, ": expected TENANT sha256:HEX with 64 hexadecimal digits"));
+      return absl::InvalidArgumentError(absl::StrCat("line ", number,
+                                                     ": expected TENANT sha256:HEX with 64 hexadecimal digits, and ",
+                                                     kAdmin, " behind it or nothing"));
     }
     if (!IsTenantName(fields[0])) {
       return absl::InvalidArgumentError(absl::StrCat("line ", number, ": a tenant's name is ", kTenantRule));
     }
-    if (!table.tenants_.emplace(digest, fields[0]).second) {
+    if (!table.callers_.emplace(digest, Caller{.tenant = fields[0], .is_admin = is_admin}).second) {
       return absl::InvalidArgumentError(absl::StrCat("line ", number, ": the same token as in a line before"));
     }
   }
-  if (table.tenants_.empty()) {
+  if (table.callers_.empty()) {
     return absl::InvalidArgumentError("no token; expected lines TENANT sha256:HEX");
   }
   return table;
 }
 
-std::optional<std::string> TokenTable::TenantOf(std::string_view token) const {
+std::optional<Caller> TokenTable::CallerOf(std::string_view token) const {
   if (token.size() > kMaxTokenLength) {
     return std::nullopt;
   }
-  const auto found = tenants_.find(Hash(token));
-  return found == tenants_.end() ? std::nullopt : std::optional(found->second);
+  const auto found = callers_.find(Hash(token));
+  return found == callers_.end() ? std::nullopt : std::optional(found->second);
 }
 
-absl::StatusOr<std::string> MakeTokenLine(std::string_view tenant, std::string_view token) {
+absl::StatusOr<std::string> MakeTokenLine(std::string_view tenant, std::string_view token, bool is_admin) {
   if (!IsTenantName(tenant)) {
     return absl::InvalidArgumentError(absl::StrCat("a tenant's name is ", kTenantRule));
   }
@@ -95,7 +98,8 @@ absl::StatusOr<std::string> MakeTokenLine(std::string_view tenant, std::string_v
                                                    TokenTable::kMaxTokenLength,
                                                    " visible characters of ASCII, made by `openssl rand -hex 32`"));
   }
-  return absl::StrCat(View(tenant), " ", View(kHashPrefix), absl::BytesToHexString(Hash(token)));
+  return absl::StrCat(View(tenant), " ", View(kHashPrefix), absl::BytesToHexString(Hash(token)),
+                      is_admin ? absl::StrCat(" ", kAdmin) : "");
 }
 
 }  // namespace wellspace::server

@@ -15,6 +15,12 @@ namespace wellspace::server {
 // digit. Such a name forges nothing in a log.
 bool IsTenantName(std::string_view name);
 
+// Who makes a call.
+struct Caller {
+  std::string tenant = "default";  // a name as IsTenantName wants it
+  bool is_admin = false;           // may call AdminService
+};
+
 // The table of tokens, each with its tenant.
 //
 // Tokens are looked up by their SHA-256, without salt: they are random and at least kMinTokenLength long, so that no
@@ -26,19 +32,20 @@ class TokenTable {
   static constexpr size_t kMinTokenLength = 32;
   static constexpr size_t kMaxTokenLength = 4096;
 
-  // Reads lines "TENANT sha256:HEX". Empty lines, and all after a '#', are ignored; a tenant may have several tokens.
+  // Reads lines "TENANT sha256:HEX", with "admin" behind it for a token that is an admin's. Empty lines, and all after
+  // a '#', are ignored; a tenant may have several tokens.
   //
   // Errors:     INVALID_ARGUMENT, with the number of the line and what would be accepted, when a line is none of these,
   //             a token comes twice, or there is none at all.
   static absl::StatusOr<TokenTable> Parse(std::string_view text);
 
-  // The tenant of `token`, or none when the token is unknown.
-  std::optional<std::string> TenantOf(std::string_view token) const;
+  // Who has `token`, or none when the token is unknown.
+  std::optional<Caller> CallerOf(std::string_view token) const;
 
-  size_t size() const { return tenants_.size(); }
+  size_t size() const { return callers_.size(); }
 
  private:
-  std::unordered_map<std::string, std::string> tenants_;  // by the SHA-256 of the token, 32 bytes
+  std::unordered_map<std::string, Caller> callers_;  // by the SHA-256 of the token, 32 bytes
 };
 
 // The line of TokenTable for `token`, without an end of line.
@@ -46,7 +53,7 @@ class TokenTable {
 // Errors:     INVALID_ARGUMENT: `tenant` is no name of one; `token` has characters other than the visible ones of
 //             ASCII, or fewer than kMinTokenLength or more than kMaxTokenLength of them. The message does not have the
 //             token.
-absl::StatusOr<std::string> MakeTokenLine(std::string_view tenant, std::string_view token);
+absl::StatusOr<std::string> MakeTokenLine(std::string_view tenant, std::string_view token, bool is_admin = false);
 
 }  // namespace wellspace::server
 

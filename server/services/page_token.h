@@ -19,11 +19,15 @@ namespace wellspace::server {
 inline constexpr int kMaxPageSize = 1000;
 inline constexpr size_t kMaxPageBytes = size_t{kMaxResponseBytes} / 2;
 
-// A token for `position` in the list of which `list` is everything that it depends on.
-std::string MakePageToken(const std::string& list, uint64_t position);
+// A token for `position`, any bytes, in the list of which `list` is everything that it depends on.
+std::string MakePageToken(const std::string& list, const std::string& position);
 
 // The position of a token of the same list; nothing if it was not made for that.
-std::optional<uint64_t> ReadPageToken(const std::string& list, const std::string& token);
+std::optional<std::string> ReadPageToken(const std::string& list, const std::string& token);
+
+// A number as a position, and back; nothing if it is none.
+std::string PositionOf(uint64_t number);
+std::optional<uint64_t> NumberAt(const std::string& position);
 
 // Appends Item::Describe() of the first of `items` to `page`, at most `count` and kMaxPageBytes; returns how many.
 template <typename Item, typename Message>

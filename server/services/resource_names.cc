@@ -33,6 +33,19 @@ absl::Status InvalidName(const std::string& name, const std::string& field, cons
                    field);
 }
 
+// `find`: absl::StatusOr<std::shared_ptr<Session>> find(const std::string& session).
+template <typename Find>
+absl::StatusOr<FoundOperation> FindOperationBy(const std::string& name, const Find& find) {
+  const std::vector<std::string> parts = Parts(name);
+  if (parts.size() != 4 || parts[0] != "sessions" || parts[2] != "operations") {
+    return InvalidName(name, "name", "sessions/{session}/operations/{operation}");
+  }
+  FoundOperation found;
+  WELLSPACE_ASSIGN_OR_RETURN(found.session, find(absl::StrCat("sessions/", parts[1])));
+  WELLSPACE_ASSIGN_OR_RETURN(found.operation, found.session->FindOperation(name));
+  return found;
+}
+
 }  // namespace
 
 absl::StatusOr<std::shared_ptr<Session>> FindSession(const CallEnvironment& environment, const Caller& caller,
@@ -46,15 +59,13 @@ absl::StatusOr<std::shared_ptr<Session>> FindSession(const CallEnvironment& envi
 
 absl::StatusOr<FoundOperation> FindOperation(const CallEnvironment& environment, const Caller& caller,
                                              const std::string& name) {
-  const std::vector<std::string> parts = Parts(name);
-  if (parts.size() != 4 || parts[0] != "sessions" || parts[2] != "operations") {
-    return InvalidName(name, "name", "sessions/{session}/operations/{operation}");
-  }
-  FoundOperation found;
-  WELLSPACE_ASSIGN_OR_RETURN(found.session,
-                             environment.sessions.Find(caller.tenant, absl::StrCat("sessions/", parts[1])));
-  WELLSPACE_ASSIGN_OR_RETURN(found.operation, found.session->FindOperation(name));
-  return found;
+  return FindOperationBy(name,
+                         [&](const std::string& session) { return environment.sessions.Find(caller.tenant, session); });
+}
+
+absl::StatusOr<FoundOperation> FindOperationOfAnyTenant(const CallEnvironment& environment, const std::string& name) {
+  return FindOperationBy(name,
+                         [&](const std::string& session) { return environment.sessions.FindOfAnyTenant(session); });
 }
 
 std::string SessionOf(const std::string& name) {

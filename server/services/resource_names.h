@@ -30,6 +30,9 @@ struct FoundOperation {
 absl::StatusOr<FoundOperation> FindOperation(const CallEnvironment& environment, const Caller& caller,
                                              const std::string& name);
 
+// The same of any tenant's.
+absl::StatusOr<FoundOperation> FindOperationOfAnyTenant(const CallEnvironment& environment, const std::string& name);
+
 // The name of the session that `name`, of an operation, begins with; anything else as it is.
 std::string SessionOf(const std::string& name);
 

@@ -4,10 +4,12 @@
 #include <string_view>
 #include <vector>
 
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "core/base/status_macros.h"
 #include "core/partition/partition.h"
+#include "server/security/tokens.h"
 #include "server/services/page_token.h"
 #include "server/wire/convert.h"
 #include "server/wire/errors.h"
@@ -21,6 +23,7 @@ constexpr size_t kMaxValueCharacters = 255;
 constexpr size_t kMaxParametersBytes = size_t{kMaxResponseBytes} / 2;
 constexpr absl::Duration kMinTtl = absl::Seconds(1);
 constexpr uint32_t kMostGhostLayers = 16;
+constexpr size_t kMostShown = 64;  // bytes of a wrong name in a message
 constexpr int32_t kNanosPerSecond = 1'000'000'000;
 
 // Of UTF-8, which protocol buffers have checked.
@@ -119,16 +122,26 @@ absl::StatusOr<uint64_t> RevisionFromProto(bool is_sent, uint64_t revision, cons
   return revision;
 }
 
-absl::StatusOr<uint64_t> PositionFromProto(const std::string& token, const std::string& list, uint64_t begin) {
-  if (token.empty()) {
-    return begin;
-  }
-  const std::optional<uint64_t> read = ReadPageToken(list, token);
+absl::StatusOr<std::string> PositionFromProto(const std::string& token, const std::string& list) {
+  const std::optional<std::string> read = token.empty() ? std::string() : ReadPageToken(list, token);
   if (!read.has_value()) {
     return Invalid("page_token was not given for this list; expected next_page_token of the page before, or none",
                    "page_token");
   }
   return *read;
+}
+
+absl::StatusOr<uint64_t> NumberFromProto(const std::string& token, const std::string& list) {
+  WELLSPACE_ASSIGN_OR_RETURN(const std::string position, PositionFromProto(token, list));
+  return NumberAt(position).value_or(0);
+}
+
+absl::Status CheckTenant(const std::string& tenant) {
+  return tenant.empty() || IsTenantName(tenant)
+             ? absl::OkStatus()
+             : Invalid(absl::StrCat("tenant is \"", absl::Utf8SafeCHexEscape(tenant.substr(0, kMostShown)),
+                                    "\"; expected the name of a tenant, or none"),
+                       "tenant");
 }
 
 absl::Status CheckParametersSize(const core::MeshParameters& parameters) {

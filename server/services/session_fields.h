@@ -64,10 +64,17 @@ absl::Status CheckPartition(const v1::MeshPartition& partition);
 // Refuses one that a mesh of so many simplices does not have.
 absl::Status CheckPartitionOf(uint64_t simplices, const v1::MeshPartition& partition);
 
-// The position of `token` in `list`; `begin` if it is empty.
+// The position of `token` in `list`; empty if it is.
 //
 // Errors:     INVALID_REQUEST.
-absl::StatusOr<uint64_t> PositionFromProto(const std::string& token, const std::string& list, uint64_t begin);
+absl::StatusOr<std::string> PositionFromProto(const std::string& token, const std::string& list);
+// The same where positions are numbers; 0 if it is empty.
+absl::StatusOr<uint64_t> NumberFromProto(const std::string& token, const std::string& list);
+
+// Refuses a name of a tenant, which may be absent, that no tenant has.
+//
+// Errors:     INVALID_REQUEST.
+absl::Status CheckTenant(const std::string& tenant);
 
 // Refuses parameters that are too large to be sent with every answer about their session.
 //

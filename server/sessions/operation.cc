@@ -53,27 +53,35 @@ std::shared_ptr<const store::v1::OperationRecord> Operation::Resumed(
   return resumed;
 }
 
-v1::Operation Operation::Describe() const {
+v1::Operation Operation::Describe(const std::string& name, const store::v1::OperationRecord& record) {
   v1::Operation message;
-  message.set_name(name_);
+  message.set_name(name);
+  *message.mutable_parameters() = record.parameters();
+  *message.mutable_create_time() = TimeToProto(absl::FromUnixNanos(record.create_time_ns()));
+  message.set_state(record.state());
+  if (record.has_progress()) {
+    *message.mutable_progress() = record.progress();
+  }
+  if (record.has_error()) {
+    *message.mutable_error() = record.error();
+  }
+  if (record.start_time_ns() != 0) {
+    *message.mutable_start_time() = TimeToProto(absl::FromUnixNanos(record.start_time_ns()));
+  }
+  if (record.end_time_ns() != 0) {
+    *message.mutable_end_time() = TimeToProto(absl::FromUnixNanos(record.end_time_ns()));
+  }
+  message.set_mesh_revision(record.mesh_revision());
+  message.set_restart(record.restart());
+  return message;
+}
+
+v1::Operation Operation::Describe() const {
   std::lock_guard lock(mutex_);
-  *message.mutable_parameters() = record_->parameters();
-  *message.mutable_create_time() = TimeToProto(absl::FromUnixNanos(record_->create_time_ns()));
-  message.set_state(record_->state());
+  v1::Operation message = Describe(name_, *record_);
   if (!events_.empty()) {
     *message.mutable_progress() = events_.back();
   }
-  if (record_->has_error()) {
-    *message.mutable_error() = record_->error();
-  }
-  if (record_->start_time_ns() != 0) {
-    *message.mutable_start_time() = TimeToProto(absl::FromUnixNanos(record_->start_time_ns()));
-  }
-  if (record_->end_time_ns() != 0) {
-    *message.mutable_end_time() = TimeToProto(absl::FromUnixNanos(record_->end_time_ns()));
-  }
-  message.set_mesh_revision(record_->mesh_revision());
-  message.set_restart(restart_);
   return message;
 }
 

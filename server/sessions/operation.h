@@ -49,6 +49,8 @@ class Operation {
   const core::MeshParameters& parameters() const { return parameters_; }
   bool restart() const { return restart_; }
   v1::Operation Describe() const;
+  // The same of one that is known by its record alone, with its last event if it has ended.
+  static v1::Operation Describe(const std::string& name, const store::v1::OperationRecord& record);
   bool IsQueued() const;
   bool HasEnded() const;
   // Whether a client has asked for its end.

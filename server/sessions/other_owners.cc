@@ -11,6 +11,7 @@
 #include "core/base/status_macros.h"
 #include "server/base/clock.h"
 #include "server/sessions/occupancy.h"
+#include "server/sessions/session_registry.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
@@ -111,7 +112,8 @@ void OtherOwners::LookAgain() {
 absl::Status OtherOwners::LookFor(const std::string& tenant, const std::string& name) {
   const Turn turn(begun_at_);
   WELLSPACE_ASSIGN_OR_RETURN(const std::optional<SessionOwner> owner, records_.FindOwner(name));
-  if (!owner.has_value() || owner->tenant != tenant) {
+  const bool is_of_any = tenant == SessionRegistry::kAnyTenant;
+  if (!owner.has_value() || !(is_of_any || owner->tenant == tenant)) {
     return NoSuchSession(name);
   }
   if (owner->is_self) {

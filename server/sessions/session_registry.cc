@@ -140,7 +140,7 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Find(const std::string
   if (session == nullptr) {
     WELLSPACE_RETURN_IF_ERROR(FindUnrestored(tenant, name));
   }
-  const bool is_own = session != nullptr && session->tenant() == tenant;
+  const bool is_own = session != nullptr && (tenant == kAnyTenant || session->tenant() == tenant);
   if (is_own && session->IsElsewhere()) {
     return Elsewhere(name);
   }
@@ -150,7 +150,7 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Find(const std::string
 absl::Status SessionRegistry::FindUnrestored(const std::string& tenant, const std::string& name) const {
   std::lock_guard lock(mutex_);
   const auto found = unrestored_.find(name);
-  return found == unrestored_.end() || found->second.tenant != tenant
+  return found == unrestored_.end() || (tenant != kAnyTenant && found->second.tenant != tenant)
              ? absl::OkStatus()
              : MakeError(v1::ERROR_REASON_FILE_DAMAGED,
                          absl::StrCat(name, " is stored, and this server cannot restore it: ", found->second.message));

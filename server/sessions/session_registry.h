@@ -41,6 +41,9 @@ std::string UnguessableSessionName();
 //             used again, and cannot be guessed.
 class SessionRegistry {
  public:
+  // In the place of the name of a tenant: whosever it is. It is no name that a tenant can have.
+  static constexpr char kAnyTenant[] = "";
+
   // Questions about sessions that other processes may have. They are asked without a lock, and answered soon.
   struct Others {
     // OK: the session is this process's; it may have been taken in meanwhile (Restore). Errors: those of Find.
@@ -73,6 +76,9 @@ class SessionRegistry {
   //             server has it. STORE_FAILED: it cannot be found out now who has it. FILE_DAMAGED: it is this server's,
   //             which could not restore it.
   absl::StatusOr<std::shared_ptr<Session>> Find(const std::string& tenant, const std::string& name);
+
+  // The same of any tenant's.
+  absl::StatusOr<std::shared_ptr<Session>> FindOfAnyTenant(const std::string& name) { return Find(kAnyTenant, name); }
 
   // The session `name`, whosever it is, as it is. Null: it is not here.
   std::shared_ptr<Session> FindHere(const std::string& name) const;

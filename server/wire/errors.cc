@@ -83,6 +83,8 @@ absl::StatusCode CodeOf(v1::ErrorReason reason) {
       return absl::StatusCode::kOutOfRange;
     case v1::ERROR_REASON_UNAUTHENTICATED:
       return absl::StatusCode::kUnauthenticated;
+    case v1::ERROR_REASON_ADMIN_ONLY:
+      return absl::StatusCode::kPermissionDenied;
     case v1::ERROR_REASON_READER_STALLED:
     case v1::ERROR_REASON_SENDER_STALLED:
       return absl::StatusCode::kDeadlineExceeded;

@@ -29,6 +29,12 @@ class MockConnection : public Connection {
               (const MeshOptions&, std::span<const double>, const CallOptions&), (override));
   MOCK_METHOD(absl::StatusOr<ServerInfo>, GetServerInfo, (const CallOptions&), (override));
   MOCK_METHOD(absl::StatusOr<Health>, CheckHealth, (const std::string&, const CallOptions&), (override));
+  MOCK_METHOD(absl::StatusOr<OwnedOperationPage>, ListAllOperations,
+              (const OperationFilter&, const PageOptions&, const CallOptions&), (override));
+  MOCK_METHOD(absl::StatusOr<Operation>, CancelAnyOperation, (const std::string&, const CallOptions&), (override));
+  MOCK_METHOD(absl::StatusOr<absl::Duration>, DrainServer, (const CallOptions&), (override));
+  MOCK_METHOD(absl::StatusOr<UsagePage>, GetUsage, (const UsageFilter&, const PageOptions&, const CallOptions&),
+              (override));
   MOCK_METHOD(absl::StatusOr<Session>, CreateSession, (const SessionOptions&, const CallOptions&), (override));
   MOCK_METHOD(absl::StatusOr<Session>, GetSession, (const std::string&, const CallOptions&), (override));
   MOCK_METHOD(absl::StatusOr<SessionPage>, ListSessions, (const Labels&, const PageOptions&, const CallOptions&),

@@ -1,9 +1,9 @@
 // Every method of the service, with any bytes for requests, against a server that works with the real mesher.
 //
 // Input: calls; each is a letter that chooses the method ('a' the first of MeshingService, then those of
-// SessionService, OperationService and QueryService in the order of their files), the number of its messages (modulo
-// 4), and the messages: the length in two bytes, low one first, and that many bytes. In a message that is one of the
-// method, names that begin with "sessions/0" are of the session made last.
+// SessionService, OperationService, QueryService and AdminService in the order of their files), the number of its
+// messages (modulo 4), and the messages: the length in two bytes, low one first, and that many bytes. In a message that
+// is one of the method, names that begin with "sessions/0" are of the session made last.
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -23,6 +23,8 @@
 #include "server/server.h"
 #include "spdlog/sinks/base_sink.h"
 #include "tests/fuzz/fuzz.h"
+#include "tests/fuzz/scratch_folder.h"
+#include "wellspace/v1/admin.pb.h"
 #include "wellspace/v1/errors.pb.h"
 #include "wellspace/v1/meshing.pb.h"
 #include "wellspace/v1/operations.pb.h"
@@ -35,14 +37,16 @@ namespace {
 using google::protobuf::MethodDescriptor;
 
 // Small, so that short inputs reach the limits, and nothing takes long.
-constexpr server::ServiceOptions kOptions = {.max_queued_jobs = 2,
-                                             .max_jobs_per_tenant = 2,
-                                             .max_threads = 2,
-                                             .max_points = 16,
-                                             .max_vertices = 300,
-                                             .max_points_per_tenant = 24,
-                                             .max_sessions = 3,
-                                             .max_sessions_per_tenant = 2};
+const server::ServiceOptions kOptions = {.max_queued_jobs = 2,
+                                         .max_jobs_per_tenant = 2,
+                                         .max_threads = 2,
+                                         .max_points = 16,
+                                         .max_vertices = 300,
+                                         .max_points_per_tenant = 24,
+                                         .max_sessions = 3,
+                                         .max_sessions_per_tenant = 2};
+// Every call has it: it is that of an admin.
+const std::string kToken(40, 't');
 constexpr absl::Duration kDeadline = absl::Seconds(60);
 
 // Requires of the log that its lines have fields.
@@ -63,7 +67,8 @@ std::vector<const MethodDescriptor*> FindMethods() {
   std::vector<const MethodDescriptor*> methods;
   for (const google::protobuf::FileDescriptor* file :
        {v1::MeshPointsRequest::descriptor()->file(), v1::Session::descriptor()->file(),
-        v1::Operation::descriptor()->file(), v1::VoronoiCellsRequest::descriptor()->file()}) {
+        v1::Operation::descriptor()->file(), v1::VoronoiCellsRequest::descriptor()->file(),
+        v1::GetUsageRequest::descriptor()->file()}) {
     for (int i = 0; i < file->service(0)->method_count(); ++i) {
       methods.push_back(file->service(0)->method(i));
     }
@@ -89,6 +94,9 @@ class Service {
     static const auto log = std::make_shared<spdlog::logger>("fuzz", std::make_shared<LogCheck>());
     server::ServerOptions options;
     options.service = kOptions;
+    static const std::string tokens =
+        ScratchFolder::Get().Write("tokens", server::MakeTokenLine("default", kToken, /*is_admin=*/true).value());
+    options.security.token_file = tokens;
     absl::StatusOr<std::unique_ptr<server::Server>> server = server::Server::Start(options, log);
     Require(server.ok(), "a server starts:", server.status().ToString());
     server_ = *std::move(server);
@@ -152,6 +160,7 @@ class Service {
     };
     grpc::ClientContext context;
     context.set_deadline(absl::ToChronoTime(absl::Now() + kDeadline));
+    context.AddMetadata("authorization", absl::StrCat("Bearer ", kToken));
     grpc::GenericStub stub(channel_);
     const auto call =
         stub.PrepareCall(&context, absl::StrCat("/", method.service()->full_name(), "/", method.name()), &queue);

@@ -45,7 +45,7 @@ void ReadTokens(std::string_view text) {
     return;
   }
   for (const std::string& word : words) {
-    Require(!tokens->TenantOf(word).has_value(), "a hash is no token:", word);
+    Require(!tokens->CallerOf(word).has_value(), "a hash is no token:", word);
   }
 }
 

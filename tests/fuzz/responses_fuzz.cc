@@ -381,11 +381,15 @@ constexpr std::array kCalls = {
       }
       return carried.status();
     }},
+    Call{[](client::Connection& c) { return c.ListAllOperations({}, {}, Patience()).status(); }},
+    Call{[](client::Connection& c) { return c.CancelAnyOperation(kSession, Patience()).status(); }},
+    Call{[](client::Connection& c) { return c.DrainServer(Patience()).status(); }},
+    Call{[](client::Connection& c) { return c.GetUsage({}, {}, Patience()).status(); }},
 };
 
 constexpr size_t kMeshPoints = 0;
 constexpr size_t kDownloadMesh = 10;
-constexpr size_t kDownloadPart = kCalls.size() - 2;
+constexpr size_t kDownloadPart = 24;
 
 template <typename Response>
 std::string WithChecksum(std::string bytes) {

@@ -1,6 +1,7 @@
 #include "tests/server/service_methods.h"
 
 #include "absl/strings/str_cat.h"
+#include "wellspace/v1/admin.pb.h"
 #include "wellspace/v1/meshing.pb.h"
 #include "wellspace/v1/operations.pb.h"
 #include "wellspace/v1/queries.pb.h"
@@ -12,7 +13,8 @@ std::vector<const google::protobuf::MethodDescriptor*> ServiceMethods() {
   std::vector<const google::protobuf::MethodDescriptor*> methods;
   for (const google::protobuf::FileDescriptor* file :
        {v1::MeshPointsRequest::descriptor()->file(), v1::Session::descriptor()->file(),
-        v1::Operation::descriptor()->file(), v1::VoronoiCellsRequest::descriptor()->file()}) {
+        v1::Operation::descriptor()->file(), v1::VoronoiCellsRequest::descriptor()->file(),
+        v1::GetUsageRequest::descriptor()->file()}) {
     for (int i = 0; i < file->service_count(); ++i) {
       for (int j = 0; j < file->service(i)->method_count(); ++j) {
         methods.push_back(file->service(i)->method(j));

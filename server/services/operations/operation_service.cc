@@ -52,11 +52,11 @@ absl::Status List(const CallEnvironment& environment, const Caller& caller, cons
                              FindSession(environment, caller, request.parent(), "parent"));
   WELLSPACE_ASSIGN_OR_RETURN(const size_t count, PageSizeOf(request));
   const std::string list = absl::StrCat("operations of ", session->name());
-  WELLSPACE_ASSIGN_OR_RETURN(const uint64_t after, PositionFromProto(request.page_token(), list, 0));
+  WELLSPACE_ASSIGN_OR_RETURN(const uint64_t after, NumberFromProto(request.page_token(), list));
   const std::vector<std::shared_ptr<Operation>> operations = session->ListOperations(after, count + 1);
   const size_t listed = FillPage(operations, count, response.mutable_operations());
   if (listed < operations.size()) {
-    response.set_next_page_token(MakePageToken(list, operations[listed - 1]->number()));
+    response.set_next_page_token(MakePageToken(list, PositionOf(operations[listed - 1]->number())));
   }
   return session->IsElsewhere() ? Elsewhere(session->name()) : absl::OkStatus();
 }

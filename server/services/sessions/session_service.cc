@@ -59,13 +59,13 @@ absl::Status List(const CallEnvironment& environment, const Caller& caller, cons
   WELLSPACE_ASSIGN_OR_RETURN(const size_t count, PageSizeOf(request));
   WELLSPACE_ASSIGN_OR_RETURN(const Labels labels, LabelsFromProto(request.labels(), "labels"));
   const std::string list = ListOf(caller, labels);
-  WELLSPACE_ASSIGN_OR_RETURN(const uint64_t after, PositionFromProto(request.page_token(), list, 0));
+  WELLSPACE_ASSIGN_OR_RETURN(const uint64_t after, NumberFromProto(request.page_token(), list));
   const std::vector<std::shared_ptr<Session>> sessions =
       environment.sessions.List(caller.tenant, absl::FromUnixNanos(static_cast<int64_t>(after)), count + 1, labels);
   const size_t listed = FillPage(sessions, count, response.mutable_sessions());
   if (listed < sessions.size()) {
     response.set_next_page_token(
-        MakePageToken(list, static_cast<uint64_t>(absl::ToUnixNanos(sessions[listed - 1]->create_time()))));
+        MakePageToken(list, PositionOf(static_cast<uint64_t>(absl::ToUnixNanos(sessions[listed - 1]->create_time())))));
   }
   return absl::OkStatus();
 }

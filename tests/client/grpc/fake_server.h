@@ -13,6 +13,7 @@
 #include "google/rpc/error_details.pb.h"
 #include "google/rpc/status.pb.h"
 #include "grpcpp/grpcpp.h"
+#include "wellspace/v1/admin.grpc.pb.h"
 #include "wellspace/v1/operations.grpc.pb.h"
 #include "wellspace/v1/queries.grpc.pb.h"
 #include "wellspace/v1/sessions.grpc.pb.h"
@@ -147,6 +148,30 @@ struct FakeOperations final : v1::OperationService::Service {
   }
 };
 
+struct FakeAdmin final : v1::AdminService::Service {
+  Unary<v1::ListAllOperationsRequest, v1::ListAllOperationsResponse> list;
+  Unary<v1::CancelAnyOperationRequest, v1::CancelAnyOperationResponse> cancel;
+  Unary<v1::DrainServerRequest, v1::DrainServerResponse> drain;
+  Unary<v1::GetUsageRequest, v1::GetUsageResponse> usage;
+
+  grpc::Status ListAllOperations(grpc::ServerContext* /*context*/, const v1::ListAllOperationsRequest* request,
+                                 v1::ListAllOperationsResponse* response) override {
+    return list(*request, *response);
+  }
+  grpc::Status CancelAnyOperation(grpc::ServerContext* /*context*/, const v1::CancelAnyOperationRequest* request,
+                                  v1::CancelAnyOperationResponse* response) override {
+    return cancel(*request, *response);
+  }
+  grpc::Status DrainServer(grpc::ServerContext* /*context*/, const v1::DrainServerRequest* request,
+                           v1::DrainServerResponse* response) override {
+    return drain(*request, *response);
+  }
+  grpc::Status GetUsage(grpc::ServerContext* /*context*/, const v1::GetUsageRequest* request,
+                        v1::GetUsageResponse* response) override {
+    return usage(*request, *response);
+  }
+};
+
 struct FakeQueries final : v1::QueryService::Service {
   Streaming<v1::ApproximateNearestNeighborsRequest, v1::ApproximateNearestNeighborsResponse> nearest;
   Streaming<v1::ClippedVoronoiCellsRequest, v1::ClippedVoronoiCellsResponse> clipped;
@@ -190,6 +215,7 @@ class FakeServer {
     builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &port_);
     builder.RegisterService(&sessions);
     builder.RegisterService(&operations);
+    builder.RegisterService(&admin);
     builder.RegisterService(&queries);
     server_ = builder.BuildAndStart();
   }
@@ -209,6 +235,7 @@ class FakeServer {
 
   FakeSessions sessions;
   FakeOperations operations;
+  FakeAdmin admin;
   FakeQueries queries;
 
  private:

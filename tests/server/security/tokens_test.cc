@@ -29,13 +29,23 @@ TEST(Tokens, KnowsWhoseTheyAre) {
                                      *MakeTokenLine("acme", other), "\n\t", *MakeTokenLine("e.v-i_l@corp", third)));
   ASSERT_TRUE(table.ok()) << table.status();
   EXPECT_EQ(table->size(), 3u);
-  EXPECT_EQ(table->TenantOf(kToken), "acme");
-  EXPECT_EQ(table->TenantOf(other), "acme");
-  EXPECT_EQ(table->TenantOf(third), "e.v-i_l@corp");
+  EXPECT_EQ(table->CallerOf(kToken)->tenant, "acme");
+  EXPECT_EQ(table->CallerOf(other)->tenant, "acme");
+  EXPECT_EQ(table->CallerOf(third)->tenant, "e.v-i_l@corp");
   for (const std::string& unknown :
        {std::string(), std::string(31, 'a'), std::string(33, 'a'), std::string(kLine), std::string(5000, 'a')}) {
-    EXPECT_EQ(table->TenantOf(unknown), std::nullopt) << unknown;
+    EXPECT_FALSE(table->CallerOf(unknown).has_value()) << unknown;
   }
+}
+
+TEST(Tokens, OneIsAnAdminsWhoseLineSaysSo) {
+  const std::string other(40, 'b');
+  const absl::StatusOr<TokenTable> table =
+      TokenTable::Parse(absl::StrCat(kLine, "\n", *MakeTokenLine("acme", other, /*is_admin=*/true), " # of operators"));
+  ASSERT_TRUE(table.ok()) << table.status();
+  EXPECT_FALSE(table->CallerOf(kToken)->is_admin) << "it is of the same tenant";
+  EXPECT_TRUE(table->CallerOf(other)->is_admin);
+  EXPECT_EQ(table->CallerOf(other)->tenant, "acme");
 }
 
 TEST(Tokens, SaysWhichLineIsWrong) {
@@ -47,6 +57,8 @@ TEST(Tokens, SaysWhichLineIsWrong) {
                                    {good + "acme sha256:" + std::string(64, 'g'), "line 2: expected"},
                                    {good + "acme md5:" + std::string(64, 'a'), "line 2: expected"},
                                    {good + kLine + " more", "line 2: expected"},
+                                   {good + kLine + " Admin", "line 2: expected"},
+                                   {good + kLine + " admin admin", "line 2: expected"},
                                    {"\n\n-acme sha256:" + std::string(64, '0'), "line 3: a tenant's name"},
                                    {"a/b sha256:" + std::string(64, '0'), "line 1: a tenant's name"},
                                    {good + "evil" + std::string(kLine).substr(4), "line 2: the same token"}}) {
