@@ -17,6 +17,7 @@ void AddCommands(CLI::App& app, int& exit_code) {
   AddViewCommand(app, exit_code);
   AddConsoleCommand(app, exit_code);
   AddServerCommands(app, exit_code);
+  AddAdminCommands(app, exit_code);
   AddCompletionCommands(app, exit_code);
 }
 

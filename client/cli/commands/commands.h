@@ -22,6 +22,7 @@ void AddRenderCommand(CLI::App& app, int& exit_code);
 void AddViewCommand(CLI::App& app, int& exit_code);
 void AddConsoleCommand(CLI::App& app, int& exit_code);
 void AddServerCommands(CLI::App& app, int& exit_code);      // server info, health
+void AddAdminCommands(CLI::App& app, int& exit_code);       // admin operations, cancel, drain, usage
 void AddCompletionCommands(CLI::App& app, int& exit_code);  // completion bash, manual
 
 // All of them.
