@@ -50,8 +50,12 @@ absl::StatusOr<Operation> GrpcConnection::CancelAnyOperation(const std::string& 
 
 absl::StatusOr<absl::Duration> GrpcConnection::DrainServer(const CallOptions& call) {
   v1::DrainServerResponse response;
-  WELLSPACE_RETURN_IF_ERROR(
-      Call(*servers_.first().admin, &v1::AdminService::Stub::DrainServer, v1::DrainServerRequest(), call, &response));
+  // Not repeated: where the answer was lost, another server, or the next process, may be at the address.
+  WELLSPACE_RETURN_IF_ERROR(retrier_.Run(call.timeout, call.stop, [&](Attempt& attempt) {
+    CallContext context(attempt);
+    return attempt.Final(
+        FromGrpcStatus(servers_.first().admin->DrainServer(context.get(), v1::DrainServerRequest(), &response)));
+  }));
   return DurationFromProto(response.grace());
 }
 

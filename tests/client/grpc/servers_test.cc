@@ -553,5 +553,14 @@ TEST(TargetOf, IsNoFile) {
   EXPECT_EQ(TargetOf("[::1]:1"), "[::1]:1");
 }
 
+// Behind the address may be another server by then.
+TEST_F(ServersTest, ADrainIsAskedForOnce) {
+  first_.Become([](const Heard&) { return Answer{{}, grpc::Status(grpc::StatusCode::UNAVAILABLE, "gone")}; });
+  EXPECT_TRUE(absl::IsUnavailable(Client().DrainServer().status()));
+  EXPECT_EQ(first_.heard().size(), 1);
+  EXPECT_TRUE(absl::IsUnavailable(Client().GetUsage().status()));
+  EXPECT_GT(first_.heard().size(), 2) << "other calls are repeated";
+}
+
 }  // namespace
 }  // namespace wellspace::client
