@@ -9,6 +9,7 @@
 
 #include "core/features/solids.h"
 #include "core/features/triangle_pairs.h"
+#include "tests/support/lender_with_a_turn.h"
 #include "tests/support/seeded_test.h"
 #include "tests/support/surfaces.h"
 
@@ -244,6 +245,27 @@ TEST_F(BoxedSurfaceTest, IsCancelled) {
   const SurfaceComplex complex = *MakeSurfaceComplex(sheet.points, {}, sheet.Features(), context);
   context.Cancel();
   EXPECT_EQ(CutAtBox(complex, kBox, 0, kReach, 0, context).status().code(), absl::StatusCode::kCancelled);
+}
+
+// Before the work, and again wherever memory is asked for: the loops behind that look at the context.
+TEST_F(BoxedSurfaceTest, IsStoppedWhileItWorks) {
+  const test::TestSurface sheet = test::Sheet(-0.3, 1.3, 4, [](double x, double) { return 0.25 + 0.1 * x; });
+  const RunContext context;
+  const SurfaceComplex complex = *MakeSurfaceComplex(sheet.points, {}, sheet.Features(), context);
+  for (const bool cancels : {false, true}) {
+    for (int turn = 0;; ++turn) {
+      SCOPED_TRACE(turn);
+      RunContext stopped;
+      test::LenderWithATurn lender(stopped, turn, cancels);
+      const absl::Status status = CutAtBox(complex, kBox, 0, kReach, 0, stopped).status();
+      if (lender.asked() <= turn) {
+        EXPECT_TRUE(status.ok()) << status;
+        EXPECT_GE(turn, 3);
+        break;
+      }
+      EXPECT_EQ(status.code(), cancels ? absl::StatusCode::kCancelled : absl::StatusCode::kResourceExhausted);
+    }
+  }
 }
 
 }  // namespace

@@ -16,6 +16,7 @@
 #include "core/validate/validate.h"
 #include "tests/support/canonical.h"
 #include "tests/support/clouds.h"
+#include "tests/support/lender_with_a_turn.h"
 
 namespace wellspace::core {
 namespace {
@@ -301,32 +302,6 @@ TEST_P(SliverTest, ARepairedMeshIsFoundAgainFromFacetToFacet) {
   EXPECT_TRUE(Validate(parameters, *more, cloud_).ok()) << Validate(parameters, *more, cloud_);
 }
 
-// Lends memory, but at the n-th time it is asked in the phase of slivers: then it refuses, or cancels the run.
-class LenderWithATurn final : public MemoryLender {
- public:
-  LenderWithATurn(RunContext& context, int turn, bool cancels) : context_(context), turn_(turn), cancels_(cancels) {
-    context.SetMemoryLender(this);
-  }
-  absl::Status Reserve(uint64_t) override { return absl::OkStatus(); }
-  absl::Status Allow(uint64_t) override {
-    if (context_.Snapshot().phase != Phase::kSlivers || asked_++ != turn_) {
-      return absl::OkStatus();
-    }
-    if (cancels_) {
-      context_.Cancel();
-      return absl::OkStatus();
-    }
-    return absl::ResourceExhaustedError("no more");
-  }
-  int asked() const { return asked_; }
-
- private:
-  RunContext& context_;
-  const int turn_;
-  const bool cancels_;
-  int asked_ = 0;
-};
-
 // Between any two passes repair can be stopped; its work until then is valid, and a later run goes on from there.
 TEST(SliverSessionTest, StoppedAfterAnyPassItGoesOn) {
   const std::vector<double> cloud = test::MakeCloud("uniform", 3, 300);
@@ -335,7 +310,7 @@ TEST(SliverSessionTest, StoppedAfterAnyPassItGoesOn) {
     for (int turn = 0;; ++turn) {
       SCOPED_TRACE(turn);
       RunContext stopped;
-      LenderWithATurn lender(stopped, turn, cancels);
+      test::LenderWithATurn lender(stopped, turn, cancels, Phase::kSlivers);
       auto mesher = Mesher::Create(parameters, cloud, stopped);
       ASSERT_TRUE(mesher.ok()) << mesher.status();
       const absl::Status status = (*mesher)->Refine(parameters, stopped);
