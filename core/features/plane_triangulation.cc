@@ -299,12 +299,14 @@ class Flips {
       sides.push_back({{low, high}, side});
     }
     for (const auto& [a, b] : segments) {
+      WELLSPACE_RETURN_IF_ERROR(CheckAt(sides.size(), context_));
       sides.push_back({{std::min(a, b), std::max(a, b)}, kNone});
     }
     WELLSPACE_RETURN_IF_ERROR(CancellableSort(sides, std::less<std::pair<SegmentEnds, uint32_t>>(), context_));
     beyond_.assign(3 * triangles_.size(), kNone);
+    size_t step = 0;
     for (size_t i = 0; i + 1 < sides.size(); ++i) {
-      WELLSPACE_RETURN_IF_ERROR(CheckAt(i, context_));
+      WELLSPACE_RETURN_IF_ERROR(CheckAt(step++, context_));
       const bool is_at_segment =
           sides[i + 1].second == kNone || (i + 2 < sides.size() && sides[i + 2].first == sides[i].first);
       if (sides[i].first == sides[i + 1].first && !is_at_segment) {
