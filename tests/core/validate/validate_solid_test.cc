@@ -423,6 +423,58 @@ TEST(ValidateSolidTest, ACavityThatIsFilledIsFound) {
   EXPECT_THAT(std::string(Compare(mesh, ViewOf(surface)).verdict.message()), HasSubstr("but in no tetrahedron"));
 }
 
+// Each by a mesh that is right by itself, and has no tags or regions that could tell.
+TEST(ValidateSolidTest, AHoleAShellAndACreaseThatAreMissingAreFound) {
+  const std::vector<double> line = {0, 1, 2, 3};
+  const auto verdict = [](SolidTestMesh mesh, SurfaceView surface, double tolerance) {
+    EXPECT_TRUE(CheckAlone(mesh).ok()) << CheckAlone(mesh);
+    mesh.tags.assign(mesh.tags.size(), 1);
+    return std::string(Compare(mesh, surface, tolerance).verdict.message());
+  };
+  const auto block = [&](auto is_there) {
+    TestSurface surface = test::Boxes(line, line, {0, 1}, [&](int i, int j, int) { return is_there(i, j) ? 1 : 0; });
+    surface.markers.assign(surface.markers.size(), 1);
+    return surface;
+  };
+  const TestSurface whole = block([](int, int) { return true; });
+  const TestSurface ring = block([](int i, int j) { return i != 1 || j != 1; });
+  const TestSurface two = block([](int i, int) { return i != 1; });
+  const TestSurface one = block([](int i, int) { return i == 0; });
+  EXPECT_EQ(verdict(MeshOf(ring), ViewOf(ring), 0.01), "");
+  EXPECT_THAT(verdict(MeshOf(whole), ViewOf(ring), 0.01), HasSubstr("away from the surface at (1.5, 1.5, "));
+  EXPECT_EQ(verdict(MeshOf(two), ViewOf(two), 0.01), "");
+  EXPECT_THAT(verdict(MeshOf(one), ViewOf(two), 0.01), HasSubstr("but in no tetrahedron"));
+  // A roof that is lower than the tolerance: the crease along its top is no edge of the mesh.
+  TestSurface roofed{.points = whole.points, .corners = {}, .markers = {}};
+  const uint32_t low = roofed.AddPoint({1.5, 0, 1.2});
+  const uint32_t high = roofed.AddPoint({1.5, 3, 1.2});
+  const uint32_t first = roofed.AddPoint({0, 0, 1});
+  const uint32_t second = roofed.AddPoint({3, 0, 1});
+  const uint32_t third = roofed.AddPoint({3, 3, 1});
+  const uint32_t fourth = roofed.AddPoint({0, 3, 1});
+  const uint32_t below_first = roofed.AddPoint({0, 0, 0});
+  const uint32_t below_second = roofed.AddPoint({3, 0, 0});
+  const uint32_t below_third = roofed.AddPoint({3, 3, 0});
+  const uint32_t below_fourth = roofed.AddPoint({0, 3, 0});
+  const auto add = [&](const std::vector<uint32_t>& polygon) {
+    for (size_t i = 1; i + 1 < polygon.size(); ++i) {
+      roofed.AddTriangle({polygon[0], polygon[i], polygon[i + 1]}, 1);
+    }
+  };
+  add({below_first, below_fourth, below_third, below_second});
+  add({below_first, below_second, second, low, first});
+  add({below_third, below_fourth, fourth, high, third});
+  add({below_second, below_third, third, second});
+  add({below_fourth, below_first, first, fourth});
+  add({first, low, high, fourth});
+  add({low, second, third, high});
+  SurfaceView sharp = ViewOf(roofed);
+  sharp.features.crease_angle = 10;
+  EXPECT_THAT(verdict(MeshOf(whole), sharp, 0.25), HasSubstr("along curves of the surface"));
+  sharp.features.crease_angle = 180;
+  EXPECT_EQ(verdict(MeshOf(whole), sharp, 0.25), "");
+}
+
 TEST(ValidateSolidTest, DeviationIsMeasuredBothWays) {
   // A cube under a roof, and a mesh that has the cube alone.
   TestSurface house = test::Cube();
