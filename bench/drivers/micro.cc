@@ -369,7 +369,12 @@ void RegisterAll() {
   add("ClippedCellsOfInput", BM_ClippedCellsOfInput<D>)->Arg(100'000)->Unit(benchmark::kMillisecond);
   add_queries("Star", BM_Star<D>);
   add("Locate", BM_Locate<D>)->Arg(1'000'000)->Unit(benchmark::kMillisecond);
-  add("MeshBySamples", BM_MeshBySamples<D>)->Arg(10)->Arg(1'000)->Arg(40'000)->Unit(benchmark::kMillisecond);
+  add("MeshBySamples", BM_MeshBySamples<D>)
+      ->Arg(10)
+      ->Arg(1'000)
+      ->Arg(40'000)
+      ->Arg(1'000'000)
+      ->Unit(benchmark::kMillisecond);
   add("Cut", BM_Cut<D>)->Arg(10'000)->Unit(benchmark::kMicrosecond);
   for (const auto& [name, stage] :
        {std::pair("DecideCut/Word", core::Stage::kWord), std::pair("DecideCut/Integer", core::Stage::kInteger),
