@@ -22,7 +22,7 @@ namespace wellspace::fuzz {
 namespace {
 
 // Small, so that short inputs reach the limits.
-constexpr server::ServiceOptions kOptions = {.max_threads = 2, .max_points = 16, .max_vertices = 500};
+const server::ServiceOptions kOptions = {.max_threads = 2, .max_points = 16, .max_vertices = 500};
 
 void RequireError(const absl::Status& refusal) {
   const grpc::Status status = server::ToGrpcStatus(refusal);
