@@ -30,21 +30,26 @@ uint64_t SlotsFor(uint64_t rows) { return std::bit_ceil(kSlotsPerRow * std::max<
 // Finds rows of an array by their numbers.
 class RowTable {
  public:
-  RowTable(std::span<const uint32_t> rows, size_t width)
-      : rows_(rows), width_(width), slots_(SlotsFor(rows.size() / width), kNoRow) {}
+  // For at most `most` rows of `rows`.
+  RowTable(std::span<const uint32_t> rows, size_t width, uint64_t most)
+      : rows_(rows), width_(width), slots_(SlotsFor(most), kNoRow) {}
 
   absl::Status Fill(const RunContext& context) {
     for (uint64_t row = 0; row < rows_.size() / width_; ++row) {
       if (row % kRowsBetweenChecks == 0) {
         WELLSPACE_RETURN_IF_ERROR(context.Check());
       }
-      uint64_t slot = HashOf(&rows_[row * width_]);
-      while (slots_[slot] != kNoRow) {
-        slot = (slot + 1) & (slots_.size() - 1);
-      }
-      slots_[slot] = static_cast<uint32_t>(row);
+      Add(row);
     }
     return absl::OkStatus();
+  }
+
+  void Add(uint64_t row) {
+    uint64_t slot = HashOf(&rows_[row * width_]);
+    while (slots_[slot] != kNoRow) {
+      slot = (slot + 1) & (slots_.size() - 1);
+    }
+    slots_[slot] = static_cast<uint32_t>(row);
   }
 
   // The first row that equals `row`, or kNoRow.
@@ -81,7 +86,7 @@ absl::Status TooLarge(uint64_t max_bytes) {
 // Where the rows of `next` come from. Equal rows next to each other make a run, so that most of them are not looked up.
 absl::StatusOr<MovedRows> DiffMovedRows(std::span<const uint32_t> base, std::span<const uint32_t> next, size_t width,
                                         uint64_t max_bytes, const RunContext& context) {
-  RowTable table(base, width);
+  RowTable table(base, width, base.size() / width);
   WELLSPACE_RETURN_IF_ERROR(table.Fill(context));
   MovedRows moved;
   const uint64_t base_rows = base.size() / width;
@@ -109,6 +114,56 @@ absl::StatusOr<MovedRows> DiffMovedRows(std::span<const uint32_t> base, std::spa
     }
     ++moved.runs.back().kept;
     expected = found + 1;
+  }
+  return moved;
+}
+
+// The runs of `rows`, whose kept ones are in the order of the base, but that new rows which equal one that goes are
+// kept: repair takes simplices away, and makes some of them again.
+absl::StatusOr<MovedRows> KeepingEqualRows(std::span<const uint32_t> base, const MovedRows& rows, size_t width,
+                                           const RunContext& context) {
+  // Calls visit(row) for each row of the base that goes.
+  const auto for_each_gone = [&](auto visit) {
+    uint64_t next = 0;
+    for (const RowRun& run : rows.runs) {
+      for (; next < run.begin; ++next) {
+        visit(next);
+      }
+      next = run.begin + run.kept;
+    }
+    for (; next < base.size() / width; ++next) {
+      visit(next);
+    }
+  };
+  uint64_t gone = 0;
+  for_each_gone([&](uint64_t /*row*/) { ++gone; });
+  RowTable table(base, width, gone);
+  for_each_gone([&](uint64_t row) { table.Add(row); });
+  MovedRows moved;
+  const auto keep = [&](uint64_t begin, uint64_t count) {
+    const bool goes_on = !moved.runs.empty() && moved.runs.back().added == 0 &&
+                         moved.runs.back().begin + moved.runs.back().kept == begin;
+    if (goes_on) {
+      moved.runs.back().kept += count;
+    } else if (count > 0) {
+      moved.runs.push_back({.begin = begin, .kept = count, .added = 0});
+    }
+  };
+  const uint32_t* values = rows.added.data();
+  for (const RowRun& run : rows.runs) {
+    WELLSPACE_RETURN_IF_ERROR(context.Check());
+    keep(run.begin, run.kept);
+    for (uint64_t i = 0; i < run.added; ++i, values += width) {
+      if (const uint32_t found = table.Find(values); found != kNoRow) {
+        keep(found, 1);
+        continue;
+      }
+      if (moved.runs.empty()) {
+        moved.runs.push_back({.begin = 0, .kept = 0, .added = 0});
+      }
+      ++moved.runs.back().added;
+      moved.added.insert(moved.added.end(), values, values + width);
+    }
   }
   return moved;
 }
@@ -224,7 +279,8 @@ absl::StatusOr<MeshDelta> DiffMeshes(const Mesh& base, const Mesh& next, const M
   delta.vertex_tags = DiffChangedRows<int32_t>(base.vertex_tags, next.vertex_tags, 1);
   WELLSPACE_RETURN_IF_ERROR(context.Check());
   if (simplices != nullptr) {
-    delta.kept_simplices = *simplices;
+    WELLSPACE_ASSIGN_OR_RETURN(delta.kept_simplices,
+                               KeepingEqualRows(base.simplices, *simplices, dimension + 1, context));
   } else {
     WELLSPACE_ASSIGN_OR_RETURN(delta.kept_simplices,
                                DiffMovedRows(base.simplices, next.simplices, dimension + 1, max_bytes, context));

@@ -72,7 +72,7 @@ struct MeshDelta {
 
 // The changes that make `base` the mesh `next`. It is small where `next` is an update of `base`, and right for any two
 // meshes. One that takes more than `max_bytes` is not made. `simplices`, if not null, are the runs that make the
-// simplices of `next`, as Mesher::Update notes them: none has to be looked for then.
+// simplices of `next`, as Mesher::Update notes them: then only those that change are looked for.
 //
 // REQUIRES:   both are as Mesher makes them, or with empty arrays of the boundary.
 // Guarantees: the arrays that it makes are those of `next` to the bit, in their order.
