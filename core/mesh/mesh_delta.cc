@@ -122,23 +122,26 @@ absl::StatusOr<MovedRows> DiffMovedRows(std::span<const uint32_t> base, std::spa
 // kept: repair takes simplices away, and makes some of them again.
 absl::StatusOr<MovedRows> KeepingEqualRows(std::span<const uint32_t> base, const MovedRows& rows, size_t width,
                                            const RunContext& context) {
-  // Calls visit(row) for each row of the base that goes.
-  const auto for_each_gone = [&](auto visit) {
-    uint64_t next = 0;
-    for (const RowRun& run : rows.runs) {
-      for (; next < run.begin; ++next) {
-        visit(next);
-      }
-      next = run.begin + run.kept;
-    }
-    for (; next < base.size() / width; ++next) {
-      visit(next);
-    }
-  };
-  uint64_t gone = 0;
-  for_each_gone([&](uint64_t /*row*/) { ++gone; });
+  uint64_t gone = base.size() / width;
+  for (const RowRun& run : rows.runs) {
+    gone -= run.kept;
+  }
   RowTable table(base, width, gone);
-  for_each_gone([&](uint64_t row) { table.Add(row); });
+  uint64_t next = 0;
+  const auto add_until = [&](uint64_t end) -> absl::Status {
+    for (; next < end; ++next) {
+      if (next % kRowsBetweenChecks == 0) {
+        WELLSPACE_RETURN_IF_ERROR(context.Check());
+      }
+      table.Add(next);
+    }
+    return absl::OkStatus();
+  };
+  for (const RowRun& run : rows.runs) {
+    WELLSPACE_RETURN_IF_ERROR(add_until(run.begin));
+    next = run.begin + run.kept;
+  }
+  WELLSPACE_RETURN_IF_ERROR(add_until(base.size() / width));
   MovedRows moved;
   const auto keep = [&](uint64_t begin, uint64_t count) {
     const bool goes_on = !moved.runs.empty() && moved.runs.back().added == 0 &&

@@ -83,7 +83,7 @@ struct MeshDelta {
 absl::StatusOr<MeshDelta> DiffMeshes(const Mesh& base, const Mesh& next, const MovedRows* simplices, uint64_t max_bytes,
                                      const RunContext& context);
 
-// The memory of DiffMeshes beside its result, where it looks for simplices. Unit: bytes.
+// The memory of DiffMeshes beside its result, at most: of a table of rows of the base. Unit: bytes.
 uint64_t DeltaScratchBytes(uint64_t base_simplices);
 
 }  // namespace wellspace::core

@@ -97,9 +97,8 @@ std::shared_ptr<DeltaSnapshot> MakeDelta(const Session& session, const SessionIn
   const absl::Status status = RunGuarded([&]() -> absl::Status {
     const uint64_t most = last.loaded_bytes() / 2;  // beyond it, the whole mesh is hardly more
     const core::MovedRows* const simplices = next.simplices.has_value() ? &*next.simplices : nullptr;
-    const uint64_t scratch = simplices != nullptr ? 0 : core::DeltaScratchBytes(last.record().simplices());
-    WELLSPACE_RETURN_IF_ERROR(
-        context.AllowMemory(work.mesher->memory_bytes() + 2 * last.loaded_bytes() + scratch + most));
+    WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(work.mesher->memory_bytes() + 2 * last.loaded_bytes() +
+                                                  core::DeltaScratchBytes(last.record().simplices()) + most));
     WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<const core::Mesh> base, last.Whole(context));
     WELLSPACE_ASSIGN_OR_RETURN(const core::MeshDelta delta,
                                core::DiffMeshes(*base, next.mesh, simplices, most, context));
