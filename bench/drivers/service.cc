@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
-#include <ctime>
 #include <iostream>
 #include <string>
 #include <thread>
@@ -18,6 +17,7 @@
 #include "bench/drivers/places.h"
 #include "bench/drivers/results.h"
 #include "client/client.h"
+#include "core/base/processor_time.h"
 #include "core/meshers/mesher.h"
 #include "nlohmann/json.hpp"
 
@@ -27,12 +27,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 double SecondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
-
-double ThreadSeconds() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
 
 struct Options {
   std::string address;
@@ -69,9 +63,9 @@ double SecondsInLibrary(const Options& options) {
   std::vector<double> times;
   for (int turn = 0; turn < 21; ++turn) {
     core::RunContext context;
-    const double start = ThreadSeconds();
+    const absl::Duration start = core::ProcessorTime();
     OrExit(core::MeshPoints(parameters, points, context));
-    times.push_back(ThreadSeconds() - start);
+    times.push_back(absl::ToDoubleSeconds(core::ProcessorTime() - start));
   }
   return Quantile(times, 0.5);
 }

@@ -4,17 +4,6 @@
 #include "core/base/status_macros.h"
 
 namespace wellspace::client {
-namespace {
-
-template <typename Request>
-void SetPage(const PageOptions& page, Request& request) {
-  if (page.page_size.has_value()) {
-    request.set_page_size(*page.page_size);
-  }
-  request.set_page_token(page.page_token);
-}
-
-}  // namespace
 
 absl::StatusOr<OwnedOperationPage> GrpcConnection::ListAllOperations(const OperationFilter& filter,
                                                                      const PageOptions& page, const CallOptions& call) {

@@ -33,6 +33,14 @@ absl::Duration DurationFromProto(const google::protobuf::Duration& message);
 //
 // Errors:     DATA_LOSS for the same page again, which would never end.
 absl::Status CheckNextPage(const std::string& token, const std::string& next);
+// Has a request for a list ask for `page`.
+template <typename Request>
+void SetPage(const PageOptions& page, Request& request) {
+  if (page.page_size.has_value()) {
+    request.set_page_size(*page.page_size);
+  }
+  request.set_page_token(page.page_token);
+}
 
 // Errors:     DATA_LOSS when the counts do not fit the arrays, or a number is none.
 absl::StatusOr<CellBatch> CellsFromProto(const v1::VoronoiCellBatch& message);

@@ -35,10 +35,7 @@ absl::StatusOr<OperationPage> GrpcConnection::ListOperations(const std::string& 
                                                              const CallOptions& call) {
   v1::ListOperationsRequest request;
   request.set_parent(session);
-  if (page.page_size.has_value()) {
-    request.set_page_size(*page.page_size);
-  }
-  request.set_page_token(page.page_token);
+  SetPage(page, request);
   v1::ListOperationsResponse response;
   WELLSPACE_RETURN_IF_ERROR(
       CallOn(session, &Server::operations, &v1::OperationService::Stub::ListOperations, request, call, &response));

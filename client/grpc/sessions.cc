@@ -45,10 +45,7 @@ absl::StatusOr<Session> GrpcConnection::GetSession(const std::string& session, c
 absl::StatusOr<SessionPage> GrpcConnection::ListSessions(const Labels& labels, const PageOptions& page,
                                                          const CallOptions& call) {
   v1::ListSessionsRequest request;
-  if (page.page_size.has_value()) {
-    request.set_page_size(*page.page_size);
-  }
-  request.set_page_token(page.page_token);
+  SetPage(page, request);
   request.mutable_labels()->insert(labels.begin(), labels.end());
   v1::ListSessionsResponse response;
   WELLSPACE_RETURN_IF_ERROR(
