@@ -101,7 +101,7 @@ TEST_F(AdminReplicasTest, AnyServerTellsTheWorkOfAll) {
   EXPECT_EQ(usage.stored_bytes, acme.GetSession(session)->stored_bytes);
 }
 
-TEST_F(AdminReplicasTest, WorkIsCountedOnceWhoeverDies) {
+TEST_F(AdminReplicasTest, WorkIsCountedOnceWhicheverServerDies) {
   auto first = StartWithTokens("first");
   const auto second = StartWithTokens("second");
   client::Client ops = second->Client({.token = kOps});

@@ -97,9 +97,9 @@ TEST_F(AdminServiceTest, IsForAdminsAlone) {
   EXPECT_EQ(drains_, 0);
 }
 
-TEST(AdminService, IsForNobodyWhereNoTokensAre) {
+TEST(AdminService, IsRefusedToAllWhereNoTokensAre) {
   ServiceOptions options;
-  options.begin_drain = [] { FAIL() << "nobody may drain it"; };
+  options.begin_drain = [] { FAIL() << "it must not be drained"; };
   ServiceHarness harness(FakeMesher, options, Transport::kLoopback);
   client::Client client = client::Connect(harness.server().address()).value();
   EXPECT_EQ(client.DrainServer().status().code(), absl::StatusCode::kPermissionDenied);
